@@ -26,7 +26,7 @@ def begin_learning(state: Any) -> None:
     travels.begin(state.reference, state.r, least * np.abs(start.gain))
     travels.begin(state.travel, start.voltage, least)
     state.stage = APPROACH
-    start.samples = start.growth = start.side = 0.0
+    start.samples = start.growth = start.left = 0.0
     state.confirmed = starts.farthest(start)
     state.gone = state.handed = state.railed = state.owed = state.small = 0.0
     state.patience = driving.PATIENCE

@@ -167,11 +167,11 @@ def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any, told: Any) -> 
         return
     start.samples += 1.0
     target = goal(state, settings, r)
-    there = np.abs(target - u) <= NEAR * np.abs(u - start.origin) or is_held(settings, u, target - u)
+    left = target - u
     # A fast reference passes by: between two samples it goes farther than is near.
-    side, before = np.sign(target - u), start.side
-    start.side = side
-    there = there or side * before < 0.0
+    passed = left * start.left < 0.0
+    there = passed or np.abs(left) <= NEAR * np.abs(u - start.origin) or is_held(settings, u, left)
+    start.left = left
     longest = LONGEST * max(settings.doubling, start.lag) + 2.0 * state.gap
     if start.fastest > 0.0:
         longest += 2.0 * np.abs(target - start.origin) / start.fastest

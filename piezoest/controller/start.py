@@ -51,8 +51,8 @@ START = record(
     # Samples of a block after the first, while it is planned before its readings come; whether the user told
     # the reading at rest; shortest first way, zero for the usual one [V].
     ahead=COUNT, told=FLAG, least=AMOUNT,
-    # On which side of the voltage its goal is, on the way to the reference.
-    side=NUMBER,
+    # What was left of the way to the reference at the sample before [V].
+    left=NUMBER,
 )  # fmt: skip
 # First and longest way [V], samples of a way, of a window; the user's gain, zero for none.
 SETTINGS = record(way=FIXED, longest=FIXED, ramp=FIXED, window=FIXED, gain=FIXED)
@@ -78,8 +78,8 @@ SLEWS, MOST_SLEWING = 0.7, 400.0
 # The way back goes too far by this part of the way, so that no hysteresis is left: one half for small loops,
 # whose branches are parabolas (Rayleigh).
 OVERSHOOT = 0.5
-# Windows before the ways are repeated, twice as many each time; at most so many doublings. An odd number is
-# hardly ever a multiple of the period of hum, which would look the same at each try.
+# Windows before the ways are repeated, twice as many each time; at most so many doublings. Eleven of them
+# are hardly ever whole periods of hum, which would look the same at each try.
 PAUSE, LONGEST_PAUSE = 11.0, 8.0
 # In a block that is planned before its readings come, the second way begins after so many windows: else a
 # whole block would be lost.
@@ -272,10 +272,15 @@ def _clear(start: Any, steps: Any) -> float:
 
 
 @register_jitable
+def _is_first(start: Any, settings: Any) -> bool:
+    """Whether the present way is a first one: no longer one, and no way back."""
+    return 0.0 < np.abs(start.way) <= max(settings.start.way, start.least)
+
+
+@register_jitable
 def _late(start: Any, settings: Any) -> float:
     """Windows by which an answer may be late and sure."""
-    first = np.abs(start.way) <= max(settings.start.way, start.least) and start.tries == 0.0
-    return min(start.waited, AT_ONCE) if first else 0.0
+    return min(start.waited, AT_ONCE) if start.tries == 0.0 and _is_first(start, settings) else 0.0
 
 
 @register_jitable
@@ -335,8 +340,7 @@ def _wait(start: Any, settings: Any, u: Any, known: Any, middle: Any) -> None:
     beyond = (u - start.target) * np.sign(start.way)
     if start.ahead != 0.0:
         start.samples += 1.0
-        first = 0.0 < np.abs(start.way) <= max(settings.start.way, start.least)
-        if first and start.samples >= blind(settings):
+        if _is_first(start, settings) and start.samples >= blind(settings):
             _go_on(start, settings, u)
     elif known and 0.0 < beyond <= LONGER * np.abs(start.way):
         # The next way of a block began before the stage rested: both are one.
