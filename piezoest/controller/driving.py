@@ -17,8 +17,11 @@ BACK = 0.5
 # What is owed is paid within this fraction of a swing of the reference; faster, the loop through the models
 # would feed a resonance. In the first leg: of the leg so far, at least of LEAST_LEG swings.
 PAID, LEAST_LEG = 1.0 / 4.0, 0.1
-# Another model drives if its miss is below this fraction of that of the present one.
-BETTER = 0.8
+# Another model drives if its miss is below this fraction of that of the present one, after so many swings.
+# The recorded loop may sooner, if no more than so many legs are over and the last two were alike: no other
+# model has learnt much by then.
+BETTER, ENOUGH = 0.8, 0.25
+SOON, FIRST_LEGS = 0.2, 4.0
 # Least number of swings between two changes of model. It doubles at each return to the line.
 PATIENCE, LONGEST_PATIENCE = 0.25, 128.0
 # Swings after which a model that drives is judged; before CALM the miss may still be that of the last one.
@@ -98,6 +101,12 @@ def _faked(state: Any) -> float:
 
 
 @register_jitable
+def begins_to_repeat(state: Any) -> bool:
+    """Whether reference and voltage repeat their first legs."""
+    return state.line.legs <= FIRST_LEGS and state.reference.alike * state.travel.alike != 0.0
+
+
+@register_jitable
 def _choose(state: Any, settings: Any) -> float:
     """The model with the smallest recent error, if it is clearly better than the present one.
 
@@ -112,7 +121,8 @@ def _choose(state: Any, settings: Any) -> float:
     best, least = 0.0, np.inf
     present = np.inf
     for number in range(slots.MOST + 2):
-        miss = slots.missed(state.candidates, number * 1.0, np.inf) + faked if number > 0 else line
+        enough = SOON if number == settings.recorded and begins_to_repeat(state) else ENOUGH
+        miss = slots.missed(state.candidates, number * 1.0, enough, np.inf) + faked if number > 0 else line
         if number == settings.recorded and state.reference.nested == 0.0:
             miss = np.inf
         if number == state.driving:

@@ -285,11 +285,12 @@ def _hand_over(state: Any, settings: Any) -> None:
     state.handed = 0.0
     if state.scale > 0.0:
         slots.hand_over(state.candidates, settings.candidates)
-        repeats = state.reference.turned_now != 0.0 and state.reference.nested != 0.0
+        repeats = state.reference.turned_now * state.reference.alike != 0.0
         if repeats and state.pace.late == 0.0 and state.driving != settings.recorded:
             # What it missed on the legs before says little of a loop that is recorded anew; but late readings
-            # make a loop look better than it is.
-            slots.forget_one(state.candidates, settings.recorded)
+            # make a loop look better than it is. Nor is it to owe what lies between it and a first loop.
+            left = 0.0 if driving.begins_to_repeat(state) else 1.0
+            slots.forget_one(state.candidates, settings.recorded, left)
 
 
 @register_jitable

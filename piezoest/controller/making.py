@@ -139,7 +139,7 @@ def room(
     if estimators:
         pairs.append(candidate.layouts(recorder.LAYOUTS, recorded_loop.LAYOUTS))
         values.append({})
-        given.append({})
+        given.append({"estimator": {"fine": recorder.LONG * sample_rate}})
     layouts = kernel.layouts(slots.layout([own[0] for own in pairs]), slots.layout([own[1] for own in pairs]))
     fixed = _settings_of(sample_rate, limits, options)
     fixed |= {"candidates": slots.values(given), "recorded": len(given) or -1.0}

@@ -16,7 +16,7 @@ from numba.extending import register_jitable
 
 from piezoest.layout import AMOUNT, MEASURED, SIGN, numbers, record, whole
 
-KNOTS = 17
+KNOTS = 33
 # Two curves, up and down: voltage where each begins, and displacements from there on, at voltages that are
 # `apart` in the direction of travel (zero while nothing is known); direction of the last recorded leg.
 LOOP = record(

@@ -16,7 +16,7 @@ from piezoest._checks import WILDEST
 from piezoest.compile import like, local
 from piezoest.controller.recorded_loop import KNOTS, LOOP, STEEP, curve_of
 from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
-from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SIGN, numbers, record
+from piezoest.layout import AMOUNT, COUNT, DISTANCE, FIXED, FLAG, MEASURED, NUMBER, SIGN, numbers, record
 
 BINS = 32
 # Voltage where a leg began, samples since, width of a bin; points in each bin, sums of their voltages and
@@ -32,7 +32,8 @@ STATE = record(
     __name__, direction=SIGN, furthest=MEASURED, leg=LEG, back=LEG, far=DISTANCE, last=DISTANCE,
     longest=DISTANCE, loop=LOOP, alone=SIGN, fresh=FLAG,
 )  # fmt: skip
-LAYOUTS = STATE, record()  # of state and settings, of which there are none
+# Settings: least number of samples of a leg that is drawn finely.
+LAYOUTS = STATE, record(fine=FIXED)
 
 # A leg shorter than SHORT times the longest recent one is not recorded. At each turn the longest one loses
 # FADES of itself, less after shorter legs. A way back longer than TURN times this leg and the last one is a
@@ -42,6 +43,11 @@ SHORT, FADES, TURN = 0.05, 0.03, 0.04
 ALIKE = 0.7
 # First width of a bin, in units; degree of the polynomial; least number of bins with readings.
 NARROW, DEGREE, LEAST = 1e-3, 4, 8
+# A leg gets a higher degree if that leaves less than this part of the squares: a wide loop has sharp bends.
+# The leg must take so long [s], for on a faster one a higher degree would follow the oscillations of a
+# resonance, and be as long as the last one within this factor: only motion that repeats itself stays within
+# its ends.
+FINE, FINER, LONG, SAME = 8, 0.3, 40e-3, 0.9
 # Part of a leg that readings must cover, and of its samples that must have one: far from its points a
 # polynomial is useless.
 COVERED, READ = 0.9, 0.5
@@ -83,7 +89,16 @@ def _add(leg: Any, u: Any, x: Any) -> None:
 
 
 @register_jitable
-def _draw(state: Any, curve: Any) -> None:
+def _squares(leg: Any, left: Any) -> float:
+    """Sum of the squares of what is left in the bins."""
+    total = 0.0
+    for i in range(BINS):
+        total += leg.count[i] * left[i] * left[i]
+    return total
+
+
+@register_jitable
+def _draw(state: Any, settings: Any, curve: Any) -> None:
     """Draw a polynomial through the bins of a leg, from its beginning to its end, as a curve of the loop."""
     leg, x = state.leg, state.loop.x
     apart = np.abs(state.furthest - leg.turned) / (KNOTS - 1.0)
@@ -91,32 +106,47 @@ def _draw(state: Any, curve: Any) -> None:
     # Each polynomial and the one before it, in the bins and at the knots: p(t), t = -1...1 along the curve.
     in_bins, bins_before = like(leg.count), like(leg.count)
     at_knots, knots_before = local(KNOTS), local(KNOTS)
-    for i in range(BINS):
-        in_bins[i], bins_before[i] = 1.0, 0.0
     for k in range(KNOTS):
         at_knots[k], knots_before[k], x[curve, k] = 1.0, 0.0, 0.0
-    half, norm_before, t = 0.5 * (KNOTS - 1.0), 1.0, like(leg.count)
+    half, norm_before, used = 0.5 * (KNOTS - 1.0), 1.0, 0
+    t, left = like(leg.count), like(leg.count)
     for i in range(BINS):
-        t[i] = 0.0
+        in_bins[i], bins_before[i], t[i], left[i] = 1.0, 0.0, 0.0, 0.0
         if leg.count[i] > 0.0:
+            used += 1
             t[i] = np.abs(leg.sum_u[i] / leg.count[i] - leg.turned) / (apart * half) - 1.0
-    for _ in range(DEGREE + 1):
+            left[i] = leg.sum_x[i] / leg.count[i]
+    # The curve of the lower degree, and what it leaves.
+    plain, squares = local(KNOTS), 0.0
+    length = np.abs(state.furthest - leg.turned)
+    again = min(length, state.last) >= SAME * max(length, state.last)
+    most = FINE if again and leg.passed >= settings.fine and used >= 2 * FINE else DEGREE
+    for degree in range(most + 1):
         norm = product = middle = 0.0
         for i in range(BINS):
-            norm += leg.count[i] * in_bins[i] * in_bins[i]
-            middle += leg.count[i] * t[i] * in_bins[i] * in_bins[i]
-            product += leg.sum_x[i] * in_bins[i]
+            weight = leg.count[i] * in_bins[i]
+            norm += weight * in_bins[i]
+            middle += weight * t[i] * in_bins[i]
+            product += weight * left[i]
         if not norm > 0.0:
             break
         share, middle, before = product / norm, middle / norm, norm / norm_before
         norm_before = norm
         for i in range(BINS):
+            left[i] -= share * in_bins[i]
             next_one = (t[i] - middle) * in_bins[i] - before * bins_before[i]
             in_bins[i], bins_before[i] = next_one, in_bins[i]
         for k in range(KNOTS):
             x[curve, k] += share * at_knots[k]
             next_one = (k / half - 1.0 - middle) * at_knots[k] - before * knots_before[k]
             at_knots[k], knots_before[k] = next_one, at_knots[k]
+        if degree == DEGREE:
+            squares = _squares(leg, left)
+            for k in range(KNOTS):
+                plain[k] = x[curve, k]
+    if most == FINE and _squares(leg, left) > FINER * squares:
+        for k in range(KNOTS):
+            x[curve, k] = plain[k]
     for k in range(1, KNOTS):
         gone = (x[curve, k] - x[curve, k - 1]) * state.direction
         x[curve, k] = x[curve, k - 1] + max(gone, STEEP * apart) * state.direction
@@ -138,7 +168,7 @@ def _is_known(state: Any) -> bool:
 
 
 @register_jitable
-def _end_leg(state: Any) -> None:
+def _end_leg(state: Any, settings: Any) -> None:
     """Record a leg that is over, if it is known."""
     if not _is_known(state):
         return
@@ -146,7 +176,7 @@ def _end_leg(state: Any) -> None:
     other = 1 - curve
     alone = loop.ended == 0.0 or state.alone == state.direction
     state.alone = state.direction if alone else 0.0
-    _draw(state, curve)
+    _draw(state, settings, curve)
     if alone or loop.apart[other] < ALIKE * loop.apart[curve]:
         # Reversed, the curve is used for the other direction, too: loops are about symmetric.
         loop.begins[other], loop.apart[other] = state.furthest, loop.apart[curve]
@@ -157,13 +187,13 @@ def _end_leg(state: Any) -> None:
 
 
 @register_jitable
-def _turn(state: Any, u: Any) -> None:
+def _turn(state: Any, settings: Any, u: Any) -> None:
     """The way back has become the next leg."""
     leg, back = state.leg, state.back
     length = np.abs(state.furthest - leg.turned)
     state.longest = max(state.longest, length)
     if length > SHORT * state.longest:
-        _end_leg(state)
+        _end_leg(state, settings)
     if state.longest > 0.0:
         state.longest -= FADES * length * length / state.longest
     state.last, state.direction, state.furthest, state.far = length, -state.direction, u, 0.0
@@ -191,7 +221,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         state.far = np.abs(way)
         _add(state.back, u, x)
         if state.far > TURN * max(np.abs(state.furthest - state.leg.turned), state.last):
-            _turn(state, u)
+            _turn(state, settings, u)
 
 
 @register_jitable

@@ -126,12 +126,13 @@ def owe(slots: Any, number: Any, z: Any) -> None:
 
 
 @register_jitable
-def forget_one(slots: Any, number: Any) -> None:
-    """Forget what the model of a number has missed."""
+def forget_one(slots: Any, number: Any, left: Any) -> None:
+    """Forget what the model of a number has missed, and what it owes but for a fraction that is left."""
     if slots is not None:
         if number == 1.0:
             candidate.forget(slots.model.score)
-        forget_one(slots.others, number - 1.0)
+            slots.model.score.owed *= left
+        forget_one(slots.others, number - 1.0, left)
 
 
 @register_jitable
@@ -155,12 +156,12 @@ def stands(slots: Any, number: Any, otherwise: Any) -> float:
 
 
 @register_jitable
-def missed(slots: Any, number: Any, otherwise: Any) -> float:
-    """What the model of a number has missed; `otherwise` if there is none."""
+def missed(slots: Any, number: Any, least: Any, otherwise: Any) -> float:
+    """What the model of a number has missed in at least so many swings; `otherwise` if there is none."""
     if slots is not None:
-        if number == 1.0 and slots.model.usable != 0.0 and slots.model.score.weight >= 0.25:
+        if number == 1.0 and slots.model.usable != 0.0 and slots.model.score.weight >= least:
             return candidate.missed(slots.model.score)
-        return missed(slots.others, number - 1.0, otherwise)
+        return missed(slots.others, number - 1.0, least, otherwise)
     return otherwise
 
 

@@ -14,12 +14,13 @@ from piezoest.layout import COUNT, DISTANCE, FLAG, MEASURED, SIGN, record
 # one before two turns; turns so far, the last value, whether it has just turned; samples of this leg, those
 # since it went on clearly, those of the last leg, and of the leg before; the farthest way back since it went
 # on, the path to and fro since then, and where that was; the largest recent change from sample to sample; the
-# recent extremes; whether this leg and the last one are each no longer than the leg before.
+# recent extremes; whether this leg and the last one are each no longer than the leg before, and whether the
+# last two were about as long as each other.
 TRAVEL = record(
     direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE, swing=DISTANCE, least=DISTANCE,
     turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, waits=COUNT, usual=COUNT,
     past=COUNT, back=DISTANCE, path=DISTANCE, mark=MEASURED, fastest=DISTANCE, highest=MEASURED,
-    lowest=MEASURED, nested=FLAG,
+    lowest=MEASURED, nested=FLAG, alike=FLAG,
 )  # fmt: skip
 
 # A way back of TURN swings is a turn. Before SHOWN turns a smaller one is: the first way may lead to a bias
@@ -27,6 +28,8 @@ TRAVEL = record(
 TURN, SHOWN, FIRST_TURN = 0.05, 2.0, 0.02
 # A leg is longer than another by this part at least; it takes long from so many times its samples on.
 LONGER, LONG = 0.1, 2.0
+# Of two legs that are alike, the shorter one is at least this part of the longer one.
+ALIKE = 0.95
 # The least motion to and fro that is not noise, in swings and in noises of a reading.
 SMALL, NOISE = 1e-3, 10.0
 # A motion to and fro is noise if it goes on average farther from sample to sample than this part of the
@@ -76,6 +79,7 @@ def follow(travel: Any, value: Any) -> float:
         travel.past, travel.usual = travel.usual, travel.count
         travel.count = travel.waits = travel.back = travel.path = 0.0
         travel.nested = 1.0 if leg <= (1.0 + LONGER) * travel.leg else 0.0
+        travel.alike = 1.0 if min(leg, travel.leg) >= ALIKE * max(leg, travel.leg) else 0.0
         travel.swing, travel.leg = swing, leg
         travel.turned = travel.furthest
         travel.furthest = travel.mark = value

@@ -19,10 +19,12 @@ AROUND = record(voltage=NUMBER, inverse=recorded_loop.STATE)
 GIVEN = record(inverse=recorded_loop.LOOP)
 
 
-def recorded(u: FloatArray, x: FloatArray, state: Any = None) -> Any:
+def recorded(u: FloatArray, x: FloatArray, state: Any = None, fine: float = np.inf) -> Any:
+    """State of the recorder after a record; legs of at least `fine` samples are drawn finely."""
     state = Named(new(recorder.STATE), recorder.STATE) if state is None else state
+    settings = Named(new(recorder.LAYOUTS[1], fine=fine), recorder.LAYOUTS[1])
     for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
-        recorder.sample(state, None, u_k, x_k)
+        recorder.sample(state, settings, u_k, x_k)
     return state
 
 
@@ -86,8 +88,8 @@ def test_after_other_turns_it_goes_as_plays_do(turns: tuple[float, ...]) -> None
     # Without memory, on the absolute curves, it would be up to half a loop beside.
     absolute = np.where(
         np.diff(more[8:]) > 0.0,
-        np.interp(more[9:], np.linspace(-1.0, 1.0, 17), given.inverse.x[0]),
-        np.interp(-more[9:], np.linspace(-1.0, 1.0, 17), given.inverse.x[1]),
+        np.interp(more[9:], np.linspace(-1.0, 1.0, recorded_loop.KNOTS), given.inverse.x[0]),
+        np.interp(-more[9:], np.linspace(-1.0, 1.0, recorded_loop.KNOTS), given.inverse.x[1]),
     )
     assert np.abs(absolute - x[u.size + 9 :]).max() > 0.05
 
@@ -266,6 +268,31 @@ def test_a_rest_noise_and_ringing_are_not_recorded() -> None:
         assert np.all(np.diff(other) * direction > 0.0)
 
 
+def bent(gone: FloatArray) -> FloatArray:
+    """A way with a sharp bend behind its beginning, as in a wide loop."""
+    return gone - 0.3 * (1.0 - np.exp(-gone / 0.3))
+
+
+def misses(ends: FloatArray, fine: float) -> float:
+    """How far the curves of the last two legs between turns are from those of the record."""
+    u, x = [ends[0]], [0.0]
+    for begin, end in itertools.pairwise(ends):
+        gone = np.linspace(0.0, abs(end - begin), 201)[1:]
+        u.extend(begin + np.sign(end - begin) * gone)
+        x.extend(x[-1] + np.sign(end - begin) * bent(gone))
+    found = recorded(np.append(u, ends[-2]), np.append(x, x[-1]), fine=fine).loop
+    size = np.arange(recorded_loop.KNOTS)
+    curves = [np.abs(x - x[0]) - bent(size * apart) for x, apart in zip(found.x, found.apart, strict=True)]
+    return float(max(np.ptp(curve[1:-1]) for curve in curves))
+
+
+def test_a_slow_leg_as_long_as_the_last_one_is_drawn_finely() -> None:
+    ends = np.array([0.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+    assert misses(ends, fine=100.0) < 0.3 * misses(ends, fine=300.0)
+    longer = np.array([0.0, 1.0, -1.2, 1.4, -1.6, 1.8])
+    assert misses(longer, fine=100.0) == misses(longer, fine=300.0)
+
+
 @pytest.mark.parametrize("end", [None, 0.3, 0.75])
 def test_small_waves_and_a_leg_that_is_read_in_part_leave_it(end: float | None) -> None:
     """A polynomial is wild where it has no points, as in a block that is planned ahead."""
@@ -284,7 +311,7 @@ def test_small_waves_and_a_leg_that_is_read_in_part_leave_it(end: float | None) 
 def test_a_smaller_motion_is_recorded_anew() -> None:
     state = recorded(*loop(3.0, largest=0.2), recorded(*loop(2.0)))
     assert state.loop.begins[0] == pytest.approx(-0.2, abs=0.01)
-    assert 16.0 * state.loop.apart[1] == pytest.approx(0.4, abs=0.02)
+    assert (recorded_loop.KNOTS - 1) * state.loop.apart[1] == pytest.approx(0.4, abs=0.02)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
