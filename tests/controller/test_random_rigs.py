@@ -47,7 +47,7 @@ def test_a_sensor_that_recovers_is_no_late_answer() -> None:
 def test_a_gain_from_a_dead_zone_is_left_behind_on_the_first_long_leg() -> None:
     """A twentieth of the true gain: later the voltage went from one limit to the other again and again."""
     rig, _, run = driven(26402)
-    assert largest(rig, run, 4.0, 22.0) < 1.5
+    assert largest(rig, run, 4.0, 20.0) < 3.0
 
 
 def test_a_line_made_too_steep_by_the_way_to_the_reference_comes_back() -> None:
@@ -61,7 +61,7 @@ def test_ringing_does_not_make_the_line_steeper_and_steeper() -> None:
     assert abs(controller.state["line"]["gain"]) < 30.0 * rig.to_dict()["gain"]
 
 
-@pytest.mark.parametrize("place", [("bouc-wen", 5.0, 3.0, 504), ("duhem", 1.0, 10.0, 500)])
+@pytest.mark.parametrize("place", [("bouc-wen", 5.0, 3.0, 504), ("duhem", 5.0, 3.0, 502)])
 def test_a_loop_recorded_anew_drives_soon_after_a_change_of_amplitude(place: Any) -> None:
     """What the loop before had missed kept it from driving for another period."""
     changes = {part["change"]: part for part in Cell(*place).play(pz.AdaptiveFeedforward)["segments"]}
