@@ -342,3 +342,18 @@ def test_every_bit_of_a_number_and_what_stands_between(tmp_path: Path, separator
     rows[2500] = (rows[2500][0], "text", "1")
     with pytest.raises(ValueError, match="line 2502, column 'u': 'text' is not a number"):
         read_record(write(file, separator, rows))
+
+
+@pytest.mark.parametrize(("unit", "per_second"), [("ms", 10**3), ("µs", 10**6), ("ns", 10**9)])
+def test_time_stamps_since_1970_have_the_unit_of_their_size(
+    tmp_path: Path, unit: str, per_second: int
+) -> None:
+    """They were taken as seconds, and the sample rate was a thousandth or less."""
+    stamps = [str(1_764_400_000 * per_second + round(t * per_second)) for t in TIME]
+    numbers = [(str(u), str(x)) for u, x in zip(VOLTAGE, DISPLACEMENT, strict=True)]
+    rows = [(stamp, *pair) for stamp, pair in zip(stamps, numbers, strict=True)]
+    for header in ("timestamp,u,x", ""):
+        log = stream_record(write(tmp_path / "log.csv", ",", rows, header))
+        assert log.sample_rate == pytest.approx(RATE)
+        assert any(f"taken as {unit} since 1970" in note for note in log.notes)
+    assert read_record(tmp_path / "log.csv", units={"time": "s"}).sample_rate < RATE / 900.0

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import WILDEST, FloatArray, instance, integer, positive
-from piezoest.records.columns import BASE_UNITS, Column, choose, has_column
+from piezoest.records.columns import BASE_UNITS, UNITS, Column, choose, has_column, split_unit
 from piezoest.records.opening import open_source
 from piezoest.records.source import ROWS, LogError, Rows, Source, counted
 from piezoest.records.timing import Timing, placed, scan
@@ -15,6 +15,9 @@ from piezoest.records.timing import Timing, placed, scan
 FEWEST_ROWS = 10
 # Rows by which a sample rate that is given is compared with the column of time, and how near it must be.
 FIRST_ROWS, SAME_RATE = 1000, 0.01
+# Time since 1970 is between these [s] from 1973 to 2286: so its size tells its unit, one of these.
+SINCE_1970 = 1e8, 1e10
+OF_STAMPS = ("ms", "us", "ns")
 
 # Called with how much is done, and of how much.
 Progress = Callable[[int, int], object]
@@ -88,6 +91,8 @@ class RecordStream:
             notes.append(f"sample rate of {sample_rate:g} Hz as the file states it")
         timed = ("time",) if sample_rate is None else ()
         self._chosen = choose(source, (*timed, *wanted), named, units)
+        if timed:
+            self._chosen["time"] = _in_seconds(source, self._chosen["time"], units)
         if sample_rate is not None and not notes:
             notes += _contradicted(source, named, units, sample_rate)
         self._positions = [column.position for column in self._chosen.values()]
@@ -285,6 +290,26 @@ def _mapping(name: str, given: Any) -> dict[str, Any]:
     )
 
 
+def _first_rows(source: Source, column: Column) -> FloatArray:
+    """First numbers of a column, as they are in the file."""
+    block = next(source.read([column.position], FIRST_ROWS), None)
+    return np.empty(0) if block is None else block.values[0][:FIRST_ROWS]
+
+
+def _in_seconds(source: Source, column: Column, units: Mapping[str, str]) -> Column:
+    """The column of time; without a unit, time stamps since 1970 have that of their size."""
+    if "time" in units or (source.titles and split_unit(column.title)[1]):
+        return column
+    times = _first_rows(source, column)
+    first = float(times[np.isfinite(times)][0]) if np.isfinite(times).any() else 0.0
+    for unit in OF_STAMPS:
+        factor = UNITS["time"][unit]
+        if SINCE_1970[0] <= factor * first < SINCE_1970[1]:
+            said = f"column {column.title!r}: taken as {unit.replace('us', 'µs')} since 1970"
+            return column._replace(factor=factor, note=said)
+    return column
+
+
 def _contradicted(
     source: Source, named: dict[str, str], units: Mapping[str, str], sample_rate: float
 ) -> list[str]:
@@ -292,9 +317,9 @@ def _contradicted(
     if "time" not in named and not (source.titles and has_column(source, "time")):
         return []
     try:
-        column = choose(source, ("time",), named, units)["time"]
-        times = next(source.read([column.position], FIRST_ROWS)).values[0][:FIRST_ROWS]
-    except (LogError, StopIteration):
+        column = _in_seconds(source, choose(source, ("time",), named, units)["time"], units)
+        times = _first_rows(source, column)
+    except LogError:
         return []
     steps = column.factor * np.diff(times[np.isfinite(times)])
     rate = 1.0 / float(np.median(steps)) if steps.size and np.median(steps) > 0.0 else sample_rate
