@@ -89,6 +89,24 @@ def _add(leg: Any, u: Any, x: Any) -> None:
 
 
 @register_jitable
+def _used(leg: Any) -> int:
+    """Number of bins with readings."""
+    used = 0
+    for i in range(BINS):
+        used += leg.count[i] > 0.0
+    return used
+
+
+@register_jitable
+def _is_fine(state: Any, settings: Any) -> bool:
+    """Whether a leg may have a higher degree."""
+    leg, last = state.leg, state.last
+    length = np.abs(state.furthest - leg.turned)
+    again = min(length, last) >= SAME * max(length, last)
+    return again and leg.passed >= settings.fine and _used(leg) >= 2 * FINE
+
+
+@register_jitable
 def _squares(leg: Any, left: Any) -> float:
     """Sum of the squares of what is left in the bins."""
     total = 0.0
@@ -108,19 +126,15 @@ def _draw(state: Any, settings: Any, curve: Any) -> None:
     at_knots, knots_before = local(KNOTS), local(KNOTS)
     for k in range(KNOTS):
         at_knots[k], knots_before[k], x[curve, k] = 1.0, 0.0, 0.0
-    half, norm_before, used = 0.5 * (KNOTS - 1.0), 1.0, 0
+    half, norm_before = 0.5 * (KNOTS - 1.0), 1.0
     t, left = like(leg.count), like(leg.count)
     for i in range(BINS):
         in_bins[i], bins_before[i], t[i], left[i] = 1.0, 0.0, 0.0, 0.0
         if leg.count[i] > 0.0:
-            used += 1
             t[i] = np.abs(leg.sum_u[i] / leg.count[i] - leg.turned) / (apart * half) - 1.0
             left[i] = leg.sum_x[i] / leg.count[i]
     # The curve of the lower degree, and what it leaves.
-    plain, squares = local(KNOTS), 0.0
-    length = np.abs(state.furthest - leg.turned)
-    again = min(length, state.last) >= SAME * max(length, state.last)
-    most = FINE if again and leg.passed >= settings.fine and used >= 2 * FINE else DEGREE
+    plain, squares, most = local(KNOTS), 0.0, FINE if _is_fine(state, settings) else DEGREE
     for degree in range(most + 1):
         norm = product = middle = 0.0
         for i in range(BINS):
@@ -156,15 +170,14 @@ def _draw(state: Any, settings: Any, curve: Any) -> None:
 def _is_known(state: Any) -> bool:
     """Whether there are readings all along a leg."""
     leg = state.leg
-    used, points, nearest, farthest = 0, 0.0, np.inf, 0.0
+    points, nearest, farthest = 0.0, np.inf, 0.0
     for i in range(BINS):
         if leg.count[i] > 0.0:
-            used += 1
             points += leg.count[i]
             way = np.abs(leg.sum_u[i] / leg.count[i] - leg.turned)
             nearest, farthest = min(nearest, way), max(farthest, way)
     length = np.abs(state.furthest - leg.turned)
-    return used >= LEAST and points >= READ * leg.passed and farthest - nearest >= COVERED * length
+    return _used(leg) >= LEAST and points >= READ * leg.passed and farthest - nearest >= COVERED * length
 
 
 @register_jitable
