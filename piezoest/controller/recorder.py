@@ -14,6 +14,7 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.compile import like, local
+from piezoest.controller import travel as travels
 from piezoest.controller.recorded_loop import KNOTS, LOOP, STEEP, curve_of
 from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, FIXED, FLAG, MEASURED, NUMBER, SIGN, numbers, record
@@ -89,6 +90,12 @@ def _add(leg: Any, u: Any, x: Any) -> None:
 
 
 @register_jitable
+def _length(state: Any) -> float:
+    """Length of this leg so far."""
+    return np.abs(state.furthest - state.leg.turned)
+
+
+@register_jitable
 def _used(leg: Any) -> int:
     """Number of bins with readings."""
     used = 0
@@ -100,9 +107,8 @@ def _used(leg: Any) -> int:
 @register_jitable
 def _is_fine(state: Any, settings: Any) -> bool:
     """Whether a leg may have a higher degree."""
-    leg, last = state.leg, state.last
-    length = np.abs(state.furthest - leg.turned)
-    again = min(length, last) >= SAME * max(length, last)
+    leg = state.leg
+    again = travels.are_alike(_length(state), state.last, SAME)
     return again and leg.passed >= settings.fine and _used(leg) >= 2 * FINE
 
 
@@ -119,7 +125,7 @@ def _squares(leg: Any, left: Any) -> float:
 def _draw(state: Any, settings: Any, curve: Any) -> None:
     """Draw a polynomial through the bins of a leg, from its beginning to its end, as a curve of the loop."""
     leg, x = state.leg, state.loop.x
-    apart = np.abs(state.furthest - leg.turned) / (KNOTS - 1.0)
+    apart = _length(state) / (KNOTS - 1.0)
     state.loop.begins[curve], state.loop.apart[curve] = leg.turned, apart
     # Each polynomial and the one before it, in the bins and at the knots: p(t), t = -1...1 along the curve.
     in_bins, bins_before = like(leg.count), like(leg.count)
@@ -176,7 +182,7 @@ def _is_known(state: Any) -> bool:
             points += leg.count[i]
             way = np.abs(leg.sum_u[i] / leg.count[i] - leg.turned)
             nearest, farthest = min(nearest, way), max(farthest, way)
-    length = np.abs(state.furthest - leg.turned)
+    length = _length(state)
     return _used(leg) >= LEAST and points >= READ * leg.passed and farthest - nearest >= COVERED * length
 
 
@@ -202,8 +208,7 @@ def _end_leg(state: Any, settings: Any) -> None:
 @register_jitable
 def _turn(state: Any, settings: Any, u: Any) -> None:
     """The way back has become the next leg."""
-    leg, back = state.leg, state.back
-    length = np.abs(state.furthest - leg.turned)
+    leg, back, length = state.leg, state.back, _length(state)
     state.longest = max(state.longest, length)
     if length > SHORT * state.longest:
         _end_leg(state, settings)
@@ -233,7 +238,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
             _begin_leg(state.back, state.furthest)
         state.far = np.abs(way)
         _add(state.back, u, x)
-        if state.far > TURN * max(np.abs(state.furthest - state.leg.turned), state.last):
+        if state.far > TURN * max(_length(state), state.last):
             _turn(state, settings, u)
 
 

@@ -52,6 +52,12 @@ def begin(travel: Any, value: Any, least: Any) -> None:
 
 
 @register_jitable
+def are_alike(one: Any, other: Any, least: Any) -> bool:
+    """Whether the shorter one of two lengths is at least this part of the longer one."""
+    return min(one, other) >= least * max(one, other)
+
+
+@register_jitable
 def follow(travel: Any, value: Any) -> float:
     """Follow the signal to its next value; how far it has gone since the last one."""
     gone = np.abs(value - travel.last)
@@ -79,7 +85,7 @@ def follow(travel: Any, value: Any) -> float:
         travel.past, travel.usual = travel.usual, travel.count
         travel.count = travel.waits = travel.back = travel.path = 0.0
         travel.nested = 1.0 if leg <= (1.0 + LONGER) * travel.leg else 0.0
-        travel.alike = 1.0 if min(leg, travel.leg) >= ALIKE * max(leg, travel.leg) else 0.0
+        travel.alike = 1.0 if are_alike(leg, travel.leg, ALIKE) else 0.0
         travel.swing, travel.leg = swing, leg
         travel.turned = travel.furthest
         travel.furthest = travel.mark = value

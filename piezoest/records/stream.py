@@ -91,13 +91,13 @@ class RecordStream:
             notes.append(f"sample rate of {sample_rate:g} Hz as the file states it")
         timed = ("time",) if sample_rate is None else ()
         self._chosen = choose(source, (*timed, *wanted), named, units)
-        if timed:
-            self._chosen["time"] = _in_seconds(source, self._chosen["time"], units)
         if sample_rate is not None and not notes:
             notes += _contradicted(source, named, units, sample_rate)
         self._positions = [column.position for column in self._chosen.values()]
         source.check(self._positions)
         self._held = list(source.read(self._positions, ROWS)) if held else None
+        if timed and (first := next(self._read("time", rows=FIRST_ROWS), None)):
+            self._chosen["time"] = _in_seconds(source, self._chosen["time"], units, first.values[0])
         self._timing: Timing | None = None
         if sample_rate is None:
             self._timing = scan(str(source.path), source.place, lambda: self._times(progress))
@@ -290,18 +290,12 @@ def _mapping(name: str, given: Any) -> dict[str, Any]:
     )
 
 
-def _first_rows(source: Source, column: Column) -> FloatArray:
-    """First numbers of a column, as they are in the file."""
-    block = next(source.read([column.position], FIRST_ROWS), None)
-    return np.empty(0) if block is None else block.values[0][:FIRST_ROWS]
-
-
-def _in_seconds(source: Source, column: Column, units: Mapping[str, str]) -> Column:
-    """The column of time; without a unit, time stamps since 1970 have that of their size."""
-    if "time" in units or (source.titles and split_unit(column.title)[1]):
+def _in_seconds(source: Source, column: Column, units: Mapping[str, str], times: FloatArray) -> Column:
+    """The column of time by its first numbers; without a unit, stamps since 1970 have that of their size."""
+    known = times[np.isfinite(times)]
+    if "time" in units or (source.titles and split_unit(column.title)[1]) or not known.size:
         return column
-    times = _first_rows(source, column)
-    first = float(times[np.isfinite(times)][0]) if np.isfinite(times).any() else 0.0
+    first = float(known[0])
     for unit in OF_STAMPS:
         factor = UNITS["time"][unit]
         if SINCE_1970[0] <= factor * first < SINCE_1970[1]:
@@ -317,10 +311,11 @@ def _contradicted(
     if "time" not in named and not (source.titles and has_column(source, "time")):
         return []
     try:
-        column = _in_seconds(source, choose(source, ("time",), named, units)["time"], units)
-        times = _first_rows(source, column)
-    except LogError:
+        column = choose(source, ("time",), named, units)["time"]
+        times = next(source.read([column.position], FIRST_ROWS)).values[0][:FIRST_ROWS]
+    except (LogError, StopIteration):
         return []
+    column = _in_seconds(source, column, units, times)
     steps = column.factor * np.diff(times[np.isfinite(times)])
     rate = 1.0 / float(np.median(steps)) if steps.size and np.median(steps) > 0.0 else sample_rate
     if abs(rate / sample_rate - 1.0) < SAME_RATE:
