@@ -15,7 +15,7 @@ from numba.extending import register_jitable
 
 from piezoest.equations import recent_path
 from piezoest.equations.turning_points import TURNING_POINTS, remember
-from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
+from piezoest.estimators.model_writing import NO_MODEL, NOT_CLOSED, TO_BE_PLACED
 from piezoest.layout import AMOUNT, FIXED, FLAG, MEASURED, NUMBER, Record, numbers, record
 
 # Memory of a score, in swings; the largest recent miss counts like a root mean square PEAK times smaller.
@@ -37,7 +37,7 @@ def layouts(estimator: tuple[Record, Record], inverse: tuple[Record, Record]) ->
     state = record(
         # The voltage is centre + scale times the model's, and z is shift + scale times where it stands.
         scale=AMOUNT, centre=MEASURED, shift=MEASURED,
-        voltage=MEASURED, usable=FLAG, score=SCORE,
+        voltage=MEASURED, usable=FLAG, closed=FLAG, score=SCORE,
         path=recent_path.PATH, memory=TURNING_POINTS, inverse=inverse[0], estimator=estimator[0],
     )  # fmt: skip
     settings = record(integrated=FIXED, by_path=FIXED, inverse=inverse[1], estimator=estimator[1])
@@ -129,7 +129,8 @@ def hand_over(state: Any, settings: Any) -> None:
     found = state.estimator.write_model(state.estimator, settings.estimator, settings.inverse)
     if found == NO_MODEL:
         return
-    if found == TO_BE_PLACED:
+    state.closed = 0.0 if found == NOT_CLOSED else 1.0
+    if found >= TO_BE_PLACED:
         state.inverse.place(state, settings)
     z = _expected(state, settings)
     if state.usable != 0.0:

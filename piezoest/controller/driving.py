@@ -101,8 +101,10 @@ def _faked(state: Any) -> float:
 
 
 @register_jitable
-def begins_to_repeat(state: Any) -> bool:
-    """Whether reference and voltage repeat their first legs."""
+def begins_to_repeat(state: Any, settings: Any) -> bool:
+    """Whether reference and voltage repeat their first legs, and the stage does, or no model drives."""
+    if state.driving > 0.0 and not slots.is_closed(state.candidates, settings.recorded):
+        return False
     return state.line.legs <= FIRST_LEGS and state.reference.alike * state.travel.alike != 0.0
 
 
@@ -121,7 +123,7 @@ def _choose(state: Any, settings: Any) -> float:
     best, least = 0.0, np.inf
     present = np.inf
     for number in range(slots.MOST + 2):
-        enough = SOON if number == settings.recorded and begins_to_repeat(state) else ENOUGH
+        enough = SOON if number == settings.recorded and begins_to_repeat(state, settings) else ENOUGH
         miss = slots.missed(state.candidates, number * 1.0, enough, np.inf) + faked if number > 0 else line
         if number == settings.recorded and state.reference.nested == 0.0:
             miss = np.inf

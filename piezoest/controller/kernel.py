@@ -14,6 +14,7 @@ from piezoest.controller import line as lines
 from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
+from piezoest.controller import still as stills
 from piezoest.controller import travel as travels
 from piezoest.controller.beginning import go_on_at_rest
 from piezoest.controller.learning import take
@@ -57,7 +58,7 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         # the reference.
         score=candidate.SCORE, widest=AMOUNT, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
         travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,
-        start=starts.START, homing=homing.HOMING, pace=paces.PACE, late=late.LATE,
+        start=starts.START, still=stills.STILL, homing=homing.HOMING, pace=paces.PACE, late=late.LATE,
         candidates=candidates,
     )  # fmt: skip
     settings = record(
@@ -89,7 +90,7 @@ def run(state: Record, settings: Record, r: Vector, u: Vector) -> None:
     state.start.ahead = len(r) - 1.0
     for k in range(len(r)):
         u[k] = plan(state, settings, r[k])
-        take(state, settings, r[k], u[k], np.nan)
+        take(state, settings, np.nan, u[k], np.nan)
 
 
 @compiled

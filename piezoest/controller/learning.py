@@ -26,6 +26,7 @@ from piezoest.controller import line as lines
 from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
+from piezoest.controller import still as stills
 from piezoest.controller import travel as travels
 from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK, goal, is_held
 
@@ -289,16 +290,16 @@ def _hand_over(state: Any, settings: Any) -> None:
         if repeats and state.pace.late == 0.0 and state.driving != settings.recorded:
             # What it missed on the legs before says little of a loop that is recorded anew; but late readings
             # make a loop look better than it is. Nor is it to owe what lies between it and a first loop.
-            left = 0.0 if driving.begins_to_repeat(state) else 1.0
+            left = 0.0 if driving.begins_to_repeat(state, settings) else 1.0
             slots.forget_one(state.candidates, settings.recorded, left)
 
 
 @register_jitable
 def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
-    """Learn from a voltage that was written and a reading."""
+    """Learn from a voltage that was written and a reading; r is NaN if it was planned by this very state."""
     state.samples += 1.0
     if np.abs(r) < WILDEST:
-        state.r, state.asked = r, 1.0
+        state.r, state.asked = stills.held(state, r), 1.0
     if not np.abs(u) < WILDEST:
         if state.stage == RUN:
             doubt.lose_write(state)

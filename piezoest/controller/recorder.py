@@ -16,22 +16,24 @@ from piezoest._checks import WILDEST
 from piezoest.compile import like, local
 from piezoest.controller import travel as travels
 from piezoest.controller.recorded_loop import KNOTS, LOOP, STEEP, curve_of
-from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
+from piezoest.estimators.model_writing import NO_MODEL, NOT_CLOSED, TO_BE_PLACED
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, FIXED, FLAG, MEASURED, NUMBER, SIGN, numbers, record
 
 BINS = 32
-# Voltage where a leg began, samples since, width of a bin; points in each bin, sums of their voltages and
+# Voltage where a leg began, its samples with a voltage of their own, all its samples as far as it has gone,
+# whether a rest has broken it, width of a bin; points in each bin, sums of their voltages and
 # displacements.
 LEG = record(
-    turned=MEASURED, passed=COUNT, width=AMOUNT, count=numbers(BINS, kind=COUNT),
+    turned=MEASURED, passed=COUNT, taken=COUNT, broken=FLAG, width=AMOUNT, count=numbers(BINS, kind=COUNT),
     sum_u=numbers(BINS, kind=NUMBER), sum_x=numbers(BINS, kind=NUMBER),
 )  # fmt: skip
 # Direction of travel and furthest voltage in it; this leg; the way back from there, which becomes the next
-# leg, and its length; length of the last leg, and of the longest recent one; the loop; the only direction
-# that was recorded, zero for both; whether the loop is newer than the model in use.
+# leg, and its length; length of the last leg, and of the longest recent one; samples since the voltage went
+# farther, turns, samples of the longest recent leg; the loop; the only direction that was recorded, zero for
+# both; whether the loop is newer than the model in use.
 STATE = record(
     __name__, direction=SIGN, furthest=MEASURED, leg=LEG, back=LEG, far=DISTANCE, last=DISTANCE,
-    longest=DISTANCE, loop=LOOP, alone=SIGN, fresh=FLAG,
+    longest=DISTANCE, waits=COUNT, turns=COUNT, usual=AMOUNT, loop=LOOP, alone=SIGN, fresh=FLAG,
 )  # fmt: skip
 # Settings: least number of samples of a leg that is drawn finely.
 LAYOUTS = STATE, record(fine=FIXED)
@@ -40,6 +42,9 @@ LAYOUTS = STATE, record(fine=FIXED)
 # FADES of itself, less after shorter legs. A way back longer than TURN times this leg and the last one is a
 # turn: when models change, the voltage may go back for a moment.
 SHORT, FADES, TURN = 0.05, 0.03, 0.04
+# A leg that takes so many times the samples of the longest recent one, which becomes SLOWER at each turn, has
+# a rest within it, in which the stage creeps: it is not recorded. Before SHOWN turns nobody knows.
+BROKEN, SLOWER, SHOWN = 2.5, 0.7, 3.0
 # If a leg is shorter than this part of the next one, the next one, reversed, is better for its direction.
 ALIKE = 0.7
 # First width of a bin, in units; degree of the polynomial; least number of bins with readings.
@@ -52,12 +57,16 @@ FINE, FINER, LONG, SAME = 8, 0.3, 40e-3, 0.9
 # Part of a leg that readings must cover, and of its samples that must have one: far from its points a
 # polynomial is useless.
 COVERED, READ = 0.9, 0.5
+# A loop is closed if its end lies beside its beginning by less than this part of the last leg: a stage
+# drifts to a new loop, and some take several legs.
+CLOSED = 0.01
 
 
 @register_jitable
 def _begin_leg(leg: Any, u: Any) -> None:
     """Begin a leg at a voltage."""
-    leg.turned, leg.width, leg.passed = u, NARROW, 0.0
+    leg.turned, leg.width = u, NARROW
+    leg.passed = leg.taken = leg.broken = 0.0
     for i in range(BINS):
         leg.count[i] = leg.sum_u[i] = leg.sum_x[i] = 0.0
 
@@ -210,20 +219,34 @@ def _turn(state: Any, settings: Any, u: Any) -> None:
     """The way back has become the next leg."""
     leg, back, length = state.leg, state.back, _length(state)
     state.longest = max(state.longest, length)
-    if length > SHORT * state.longest:
+    # A way back that a rest has broken is what feedback does in it.
+    if length > SHORT * state.longest and leg.broken + back.broken == 0.0:
         _end_leg(state, settings)
     if state.longest > 0.0:
         state.longest -= FADES * length * length / state.longest
+    state.turns += 1.0
+    state.usual = max(leg.taken, SLOWER * state.usual)
     state.last, state.direction, state.furthest, state.far = length, -state.direction, u, 0.0
     leg.turned, leg.width, leg.passed = back.turned, back.width, back.passed
+    leg.taken, leg.broken = back.taken, back.broken
     for i in range(BINS):
         leg.count[i], leg.sum_u[i], leg.sum_x[i] = back.count[i], back.sum_u[i], back.sum_x[i]
+
+
+@register_jitable
+def _go_on(state: Any, leg: Any) -> None:
+    """Count the samples of a leg; a rest breaks it."""
+    leg.taken += state.waits
+    state.waits = 0.0
+    if state.turns >= SHOWN and leg.taken > BROKEN * state.usual:
+        leg.broken = 1.0
 
 
 @register_jitable
 def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     """What becomes of one sample; x is NaN where there is no reading."""
     way = u - state.furthest
+    state.waits += 1.0
     if way == 0.0:
         # A rest is no part of a leg: creep would look like hysteresis.
         return
@@ -232,14 +255,29 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         _begin_leg(state.leg, state.furthest)
     if way * state.direction > 0.0:
         state.furthest, state.far = u, 0.0
+        _go_on(state, state.leg)
         _add(state.leg, u, x)
     elif np.abs(way) > state.far:
         if state.far == 0.0:
             _begin_leg(state.back, state.furthest)
+            # A rest at the turn is no part of it.
+            state.waits = 1.0
         state.far = np.abs(way)
+        _go_on(state, state.back)
         _add(state.back, u, x)
         if state.far > TURN * max(_length(state), state.last):
             _turn(state, settings, u)
+
+
+@register_jitable
+def _is_closed(loop: Any) -> bool:
+    """Whether the end of the loop meets its beginning, along a line through the last curve."""
+    last = curve_of(loop.ended)
+    before, apart = 1 - last, loop.apart[last]
+    end, gone = loop.x[last, KNOTS - 1], loop.x[last, KNOTS - 1] - loop.x[last, 0]
+    missing = loop.begins[before] - loop.begins[last] - loop.ended * (KNOTS - 1.0) * apart
+    at_beginning = end + gone / (loop.ended * (KNOTS - 1.0) * apart) * missing
+    return np.abs(loop.x[before, 0] - at_beginning) < CLOSED * np.abs(gone)
 
 
 @register_jitable
@@ -254,4 +292,4 @@ def write_model(state: Any, settings: Any, model: Any) -> float:
         for k in range(KNOTS):
             model.x[curve, k] = loop.x[curve, k]
     model.ended = loop.ended
-    return TO_BE_PLACED
+    return TO_BE_PLACED if _is_closed(loop) else NOT_CLOSED

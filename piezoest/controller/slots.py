@@ -146,6 +146,16 @@ def owed(slots: Any, number: Any, otherwise: Any) -> float:
 
 
 @register_jitable
+def is_closed(slots: Any, number: Any) -> bool:
+    """Whether the loop of the model of a number is closed, as far as is known."""
+    if slots is not None:
+        if number == 1.0:
+            return slots.model.closed != 0.0
+        return is_closed(slots.others, number - 1.0)
+    return True
+
+
+@register_jitable
 def stands(slots: Any, number: Any, otherwise: Any) -> float:
     """Where the reference stands for the model of a number: where it does, and what it owes."""
     if slots is not None:

@@ -35,6 +35,9 @@ SMALL, NOISE = 1e-3, 10.0
 # A motion to and fro is noise if it goes on average farther from sample to sample than this part of the
 # farthest way back: a scan has more samples in a leg.
 JAGGED = 0.1
+# So many samples tell noise from a single way to and fro. The noise of a rest is little if it goes to and fro
+# by at most so many swings.
+MANY, TREMBLES = 64.0, 4e-3
 # No swing is below this fraction of the last one: noise at rest would be a swing.
 LEAST = 0.02
 # At each turn the largest recent change is multiplied by SLOWER, and the extremes come nearer to the present
@@ -156,6 +159,14 @@ def rests(travel: Any, gone: Any) -> bool:
 def in_swings(travel: Any, gone: Any) -> float:
     """A distance as a fraction of a usual swing."""
     return min(gone / travel.swing, 1.0) if travel.swing > 0.0 else 0.0
+
+
+@register_jitable
+def trembles(travel: Any) -> bool:
+    """Whether a leg has taken long, and the signal now goes to and fro by little noise."""
+    late = travel.count > LONG * max(travel.usual, travel.past, 8.0)
+    little = 0.0 < travel.back <= TREMBLES * travel.swing
+    return late and little and travel.waits > MANY and _is_jagged(travel)
 
 
 @register_jitable

@@ -9,6 +9,7 @@ from piezoest._checks import WILDEST
 from piezoest.controller import doubt, driving, faults, homing, late, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import start as starts
+from piezoest.controller import still as stills
 from piezoest.controller import travel as travels
 
 # The gain is sought; the voltage goes to where the reference needs it; all is learnt; hysteresis is erased.
@@ -113,7 +114,7 @@ def plan(state: Any, settings: Any, r: Any) -> float:
     """Voltage for the next sample of the reference."""
     state.pending += 1.0
     if np.abs(r) < WILDEST:
-        state.asked = 1.0
+        r, state.asked = stills.held(state, r), 1.0
     else:
         r = state.r
         state.missing += 1.0

@@ -1,7 +1,8 @@
 """How a compiled estimator writes its model into the settings of the model's inverse.
 
 `write_model` of a kernel does so for a controller: it returns `NO_MODEL` where the estimate has no inverse,
-`CHANGED`, or `TO_BE_PLACED` where what the inverse remembers of the voltage has to be found again.
+`CHANGED`, or `TO_BE_PLACED` where what the inverse remembers of the voltage has to be found again. It
+returns `NOT_CLOSED` where the same holds of a loop whose end does not meet its beginning yet.
 """
 
 from typing import Any
@@ -12,7 +13,7 @@ from numba.extending import register_jitable
 from piezoest.compile import local
 from piezoest.equations import loop_inverse
 
-NO_MODEL, CHANGED, TO_BE_PLACED = 0.0, 1.0, 2.0
+NO_MODEL, CHANGED, TO_BE_PLACED, NOT_CLOSED = 0.0, 1.0, 2.0, 3.0
 
 
 @register_jitable

@@ -10,6 +10,7 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
 from piezoest.controller import recorded_loop, recorder, team, travel
+from piezoest.estimators import model_writing
 from piezoest.layout import NUMBER, Named, new, record
 from tests.controller.shared import LIMITS, drive
 
@@ -260,12 +261,32 @@ def test_a_rest_noise_and_ringing_are_not_recorded() -> None:
     u, x = loop()
     t, plain = np.arange(u.size), recorded(u, x).loop
     rests = np.insert(u, 500, np.full(3000, u[499])), np.insert(x, 500, np.full(3000, x[499] - 0.1))
-    np.testing.assert_array_equal(recorded(*rests).loop.x[1], plain.x[1])
+    # A leg with a rest in it stays as it was recorded before.
+    np.testing.assert_allclose(recorded(*rests).loop.x[1], plain.x[1], rtol=0.0, atol=1e-12)
     rings = x + 0.02 * np.sin(2.0 * np.pi * t / 20.0) + np.random.default_rng(0).normal(0.0, 0.01, t.size)
     noisy = recorded(u, rings).loop
     for curve, other, direction in zip(plain.x, noisy.x, (1.0, -1.0), strict=True):
         assert np.abs(curve - other)[1:-1].max() < 0.01
         assert np.all(np.diff(other) * direction > 0.0)
+
+
+def test_a_leg_in_which_feedback_moves_a_resting_stage_is_not_recorded() -> None:
+    u, x = loop(1.25)
+    way = np.linspace(0.0, 0.2, 3000)[1:]
+    found = recorded(np.append(u, u[-1] + way), np.append(x, np.full(way.size, x[-1]))).loop
+    np.testing.assert_array_equal(found.x, recorded(u, x).loop.x)
+
+
+@pytest.mark.parametrize(
+    ("drift", "given"),
+    [(0.0, model_writing.TO_BE_PLACED), (0.01, model_writing.NOT_CLOSED)],
+    ids=["closed", "drifts"],
+)
+def test_a_loop_of_a_stage_that_drifts_is_not_closed(drift: float, given: float) -> None:
+    """The drift is that of a leg, 2 µm long."""
+    u, x = loop()
+    state = recorded(u, x + drift * np.arange(u.size) / 200.0 * np.ptp(x))
+    assert recorder.write_model(state, None, Named(new(GIVEN), GIVEN).inverse) == given
 
 
 def bent(gone: FloatArray) -> FloatArray:

@@ -72,6 +72,20 @@ def test_waves_go_on_behind_a_rest_with_more_noise_than_a_small_scan(noise: floa
     assert off[wave.size :][20_000:].max() < max(1.5 * off[wave.size - 800 : wave.size].max(), 0.05)
 
 
+def test_noise_in_a_reference_that_rests_does_not_move_the_stage() -> None:
+    """Followed, each sample of the noise would take this stage nearer to the middle of its loop."""
+    rng, noise = np.random.default_rng(0), 2e-3
+    wave = pz.signals.triangle(5.0, 5.0, 8, FS).values
+    k = wave.size - 120
+    r = np.concatenate((wave[:k], wave[k - 1] + noise * rng.normal(size=30_000), wave[k:], wave))
+    run = drive(pz.AdaptiveFeedforward(FS, limits=LIMITS), pz.SimulatedStage(FS, LOOP), r)
+    # As soon as the rest is twice as long as a leg.
+    rest = slice(k + 2000, k + 30_000)
+    assert np.ptp(run.u[rest]) < 0.5 * noise * np.ptp(run.u) / np.ptp(r)
+    off = np.abs(r - run.x)
+    assert off[rest.stop :].max() < 1.5 * max(off[k - 1000 : k].max(), noise)
+
+
 @pytest.mark.parametrize("drift", [0.001, 0.003])
 def test_a_small_scan_that_drifts_is_learnt(drift: float) -> None:
     """Before, each sample that went farther than all others was a way on: 10 nm of error instead of 0.2."""

@@ -1,0 +1,38 @@
+"""Holds a reference that rests but for noise: its mean is followed, and the voltage rests, too.
+
+Each small motion to and fro moves some stages, and models, a little towards the middle of their loop; many
+of them erase what hysteresis remembers.
+"""
+
+from typing import Any
+
+from numba.extending import register_jitable
+
+from piezoest.controller import travel as travels
+from piezoest.layout import AMOUNT, COUNT, MEASURED, record
+
+# Samples since the reference began to rest but for noise, zero if it does not; their mean and mean square.
+STILL = record(count=COUNT, mean=MEASURED, square=AMOUNT)
+# A sample changes both by this part of its distance at least: a reference may drift.
+SLOWEST = 1e-3
+# The rest is over at so many standard deviations of the noise; before, they are this part of its range.
+DEVIATIONS, FIRST = 6.0, 0.25
+
+
+@register_jitable
+def held(state: Any, r: Any) -> float:
+    """The reference, or its mean while it rests but for noise."""
+    still, reference = state.still, state.reference
+    if still.count == 0.0:
+        if not travels.trembles(reference):
+            return r
+        still.mean, still.square = r, (FIRST * reference.back) ** 2
+    off = r - still.mean
+    if off * off > DEVIATIONS * DEVIATIONS * still.square:
+        still.count = 0.0
+        return r
+    still.count += 1.0
+    share = max(1.0 / still.count, SLOWEST)
+    still.mean += share * off
+    still.square += SLOWEST * (off * off - still.square)
+    return still.mean
