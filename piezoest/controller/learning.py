@@ -296,7 +296,7 @@ def _hand_over(state: Any, settings: Any) -> None:
 
 @register_jitable
 def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
-    """Learn from a voltage that was written and a reading; r is NaN if it was planned by this very state."""
+    """Learn from a voltage that was written and a reading; r is NaN where `plan` has taken it already."""
     state.samples += 1.0
     if np.abs(r) < WILDEST:
         state.r, state.asked = stills.held(state, r), 1.0

@@ -20,9 +20,8 @@ from piezoest.estimators.model_writing import NO_MODEL, NOT_CLOSED, TO_BE_PLACED
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, FIXED, FLAG, MEASURED, NUMBER, SIGN, numbers, record
 
 BINS = 32
-# Voltage where a leg began, its samples with a voltage of their own, all its samples as far as it has gone,
-# whether a rest has broken it, width of a bin; points in each bin, sums of their voltages and
-# displacements.
+# Voltage where a leg began; its samples with a voltage of their own, and all of them until it last went on;
+# whether a rest has broken it; width of a bin; points in each bin, sums of their voltages and displacements.
 LEG = record(
     turned=MEASURED, passed=COUNT, taken=COUNT, broken=FLAG, width=AMOUNT, count=numbers(BINS, kind=COUNT),
     sum_u=numbers(BINS, kind=NUMBER), sum_x=numbers(BINS, kind=NUMBER),
@@ -219,7 +218,7 @@ def _turn(state: Any, settings: Any, u: Any) -> None:
     """The way back has become the next leg."""
     leg, back, length = state.leg, state.back, _length(state)
     state.longest = max(state.longest, length)
-    # A way back that a rest has broken is what feedback does in it.
+    # The way back is broken where feedback has gone it in a rest: this leg would have gone on.
     if length > SHORT * state.longest and leg.broken + back.broken == 0.0:
         _end_leg(state, settings)
     if state.longest > 0.0:

@@ -11,11 +11,13 @@ from numba.extending import register_jitable
 from piezoest.controller import travel as travels
 from piezoest.layout import AMOUNT, COUNT, MEASURED, record
 
-# Samples since the reference began to rest but for noise, zero if it does not; their mean and mean square.
+# Samples since the reference began to rest but for noise, zero if it does not; their mean; the mean square of
+# their distances from it.
 STILL = record(count=COUNT, mean=MEASURED, square=AMOUNT)
-# A sample changes both by this part of its distance at least: a reference may drift.
+# Weight of a sample in the mean square, and the least one in the mean: a reference may drift.
 SLOWEST = 1e-3
-# The rest is over at so many standard deviations of the noise; before, they are this part of its range.
+# The rest is over where the reference is so many standard deviations away. At first the standard deviation is
+# taken to be this part of the way to and fro.
 DEVIATIONS, FIRST = 6.0, 0.25
 
 

@@ -148,11 +148,16 @@ def progress(travel: Any, gone: Any) -> float:
 
 
 @register_jitable
-def rests(travel: Any, gone: Any) -> bool:
-    """Whether a leg has taken long, and the last sample has gone no farther: a rest is no part of a leg."""
+def _takes_long(travel: Any) -> bool:
+    """Whether this leg takes much longer than usual."""
     # Of the last two legs the slower one: many steps up take longer than one step back.
-    late = travel.count > LONG * max(travel.usual, travel.past, 8.0)
-    return late and (gone == 0.0 or travel.furthest != travel.last)
+    return travel.count > LONG * max(travel.usual, travel.past, 8.0)
+
+
+@register_jitable
+def rests(travel: Any, gone: Any) -> bool:
+    """Whether a leg takes long, and the last sample has gone no farther: a rest is no part of a leg."""
+    return _takes_long(travel) and (gone == 0.0 or travel.furthest != travel.last)
 
 
 @register_jitable
@@ -163,10 +168,9 @@ def in_swings(travel: Any, gone: Any) -> float:
 
 @register_jitable
 def trembles(travel: Any) -> bool:
-    """Whether a leg has taken long, and the signal now goes to and fro by little noise."""
-    late = travel.count > LONG * max(travel.usual, travel.past, 8.0)
+    """Whether a leg takes long, and the signal now goes to and fro by little noise."""
     little = 0.0 < travel.back <= TREMBLES * travel.swing
-    return late and little and travel.waits > MANY and _is_jagged(travel)
+    return _takes_long(travel) and little and travel.waits > MANY and _is_jagged(travel)
 
 
 @register_jitable
