@@ -10,6 +10,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
+from piezoest.controller import levels as level
 from piezoest.controller import line as lines
 from piezoest.controller import travel as travels
 from piezoest.controller.faults import MOVED, NO_RESPONSE, NONE, REVERSED, SATURATED, SCALED
@@ -17,9 +18,10 @@ from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, NUMBER, record, w
 
 READINGS = record(
     fault=whole(NONE, MOVED),
-    # The last two finite readings, their number; the voltage of the last one; how far the voltage has gone
-    # since the reading changed: now, and farthest.
+    # The last two finite readings, their number; the voltage that the last one answers; how far the voltage
+    # has gone since the reading changed: now, and farthest; where readings stand still.
     before=MEASURED, last=MEASURED, count=COUNT, voltage=MEASURED, gone=NUMBER, still=AMOUNT,
+    levels=level.LEVELS,
     # Distance from the line of the last two readings and of the last one that was not alone; number of
     # readings alone in a row; mean square of the change of the distance [µm²].
     beside_before=NUMBER, beside_last=NUMBER, beside_kept=NUMBER, alone=COUNT, changes=AMOUNT,
@@ -103,6 +105,7 @@ def _follow(readings: Any, x: Any, gone: Any) -> float:
     if change > 0.0:
         readings.step = min(readings.step, change) if readings.step > 0.0 else change
     if x != readings.last:
+        level.change(readings.levels, readings.last, x)
         readings.gone = readings.still = 0.0
     else:
         # Not the whole travel: the noise of a reference that rests leads nowhere.
@@ -233,6 +236,16 @@ def _is_alone(readings: Any, line: Any, beside: Any) -> bool:
 
 
 @register_jitable
+def _is_doubtful(readings: Any, x: Any) -> bool:
+    """Whether a fault, or what may become one, explains a reading."""
+    # A sensor that saturates is right between its levels.
+    between = readings.fault == SATURATED and level.are_known(readings.levels)
+    wrong = readings.wrong > 0.0 and is_sure(readings)
+    weak = readings.weak > DOUBT
+    return (readings.fault != NONE and not between) or weak or wrong or level.holds(readings.levels, x)
+
+
+@register_jitable
 def believed(
     readings: Any, line: Any, travel: Any, memory: Any, answered: Any, u: Any, x: Any, gone: Any, wanted: Any
 ) -> float:
@@ -245,8 +258,9 @@ def believed(
     if not np.abs(x) < WILDEST:
         return np.nan
     _size_up(readings, line, travel)
-    middle = _follow(readings, x, u - readings.voltage)
-    readings.voltage = u
+    # Late readings still change, or stand still, where the present voltage rests.
+    middle = _follow(readings, x, answered - readings.voltage)
+    readings.voltage = answered
     unit = readings.swing if readings.swing > 0.0 else np.inf
     swings = min(gone / unit, MOST)
     lines.add(readings.recent, answered, middle, max(RECENT * memory, 16.0))
@@ -267,7 +281,7 @@ def believed(
     readings.fault = _name(readings, stopped)
     if readings.fault != NONE and before == NONE:
         readings.good = 0.0
-    still = _stands_still(readings, line, travel, STANDS_STILL, 1.5)
-    wrong = readings.wrong > 0.0 and is_sure(readings)
-    doubtful = readings.fault != NONE or readings.weak > DOUBT or wrong
-    return np.nan if doubtful or still or alone or (far and (is_sure(readings) or not off)) else x
+    if _stands_still(readings, line, travel, STANDS_STILL, 1.5):
+        level.stand(readings.levels, x)
+    doubtful = alone or _is_doubtful(readings, x) or (far and (is_sure(readings) or not off))
+    return np.nan if doubtful else x
