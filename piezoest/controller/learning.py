@@ -215,7 +215,8 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
         faults.notice(state, state.readings.fault)
         if state.readings.fault != faults.NONE:
             driving.drive(state, 0.0)
-            redraw.hold(state)
+            if reading.hide_the_line(state.readings):
+                redraw.hold(state)
     # At a limit, with the stage beyond the reference, the line is wrong.
     beyond = is_held(settings, u, (raw - state.r) * line.gain)
     if np.abs(raw) < WILDEST:
@@ -249,7 +250,7 @@ def _follow(state: Any, settings: Any, r: Any, u: Any) -> tuple[float, float]:
     slots.pay(state.candidates, left)
     gone = travels.follow(state.travel, u)
     if state.stage == RUN:
-        if state.readings.fault == faults.NONE:
+        if not reading.hide_the_line(state.readings):
             redraw.draw(state)
         doubt.widen(state)
         doubt.narrow(state)

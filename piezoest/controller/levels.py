@@ -11,8 +11,8 @@ from numba.extending import register_jitable
 from piezoest.layout import FLAG, MEASURED, record
 
 # Whether the last change of the reading was a rise; the highest and the lowest reading that stood still, and
-# whether there is one.
-LEVELS = record(rose=FLAG, top=MEASURED, bottom=MEASURED, has_top=FLAG, has_bottom=FLAG)
+# whether there is one; whether the first was found before the line was sure.
+LEVELS = record(rose=FLAG, top=MEASURED, bottom=MEASURED, has_top=FLAG, has_bottom=FLAG, early=FLAG)
 
 
 @register_jitable
@@ -26,8 +26,10 @@ def change(levels: Any, before: Any, x: Any) -> None:
 
 
 @register_jitable
-def stand(levels: Any, x: Any) -> None:
-    """The reading stands still."""
+def stand(levels: Any, x: Any, sure: Any) -> None:
+    """The reading stands still; whether the line is sure by now."""
+    if not are_known(levels):
+        levels.early = 0.0 if sure else 1.0
     if levels.rose != 0.0:
         levels.top, levels.has_top = x, 1.0
     else:

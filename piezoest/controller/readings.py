@@ -236,13 +236,24 @@ def _is_alone(readings: Any, line: Any, beside: Any) -> bool:
 
 
 @register_jitable
+def _is_right_between(readings: Any) -> bool:
+    """Whether the sensor saturates, and is right between its levels."""
+    return readings.fault == SATURATED and level.are_known(readings.levels)
+
+
+@register_jitable
+def hide_the_line(readings: Any) -> bool:
+    """Whether a fault hides what the line is; a sensor that has always saturated shows a part of it."""
+    partly = _is_right_between(readings) and readings.levels.early != 0.0
+    return readings.fault != NONE and not partly
+
+
+@register_jitable
 def _is_doubtful(readings: Any, x: Any) -> bool:
     """Whether a fault, or what may become one, explains a reading."""
-    # A sensor that saturates is right between its levels.
-    between = readings.fault == SATURATED and level.are_known(readings.levels)
+    fault = readings.fault != NONE and not _is_right_between(readings)
     wrong = readings.wrong > 0.0 and is_sure(readings)
-    weak = readings.weak > DOUBT
-    return (readings.fault != NONE and not between) or weak or wrong or level.holds(readings.levels, x)
+    return fault or readings.weak > DOUBT or wrong or level.holds(readings.levels, x)
 
 
 @register_jitable
@@ -282,6 +293,6 @@ def believed(
     if readings.fault != NONE and before == NONE:
         readings.good = 0.0
     if _stands_still(readings, line, travel, STANDS_STILL, 1.5):
-        level.stand(readings.levels, x)
+        level.stand(readings.levels, x, is_sure(readings))
     doubtful = alone or _is_doubtful(readings, x) or (far and (is_sure(readings) or not off))
     return np.nan if doubtful else x
