@@ -51,8 +51,8 @@ def fit(
     All in which a model is linear (slopes of plays, their bends, gain, offset, drift, jumps) is one convex
     program, solved by CasADi and checked by SciPy. Smoothness of neighbouring slopes is chosen by five
     blocks of which each is predicted from the others. Creep gains, alpha, the delay and the stage's state
-    before the record are found outside it. Spikes and dropouts are left out, and so is a start that has
-    not settled; jumps of the displacement are fitted beside the model.
+    before the record are found outside it. Spikes, dropouts and clipped readings are left
+    out, and so is a start that has not settled; jumps of the displacement are fitted beside the model.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def fit(
         Samples by which the displacement lags the voltage, 0 to 10; ``"auto"`` looks for it. A record of one
         amplitude and frequency cannot tell it from the width of the loop.
     flaws : Flaws, optional
-        Spikes, dropouts and jumps; by default they are looked for.
+        Spikes, dropouts, clipped readings and jumps; by default they are looked for.
     settle : float, optional
         Time to leave out at the start [s]; by default as long as it is off by more than four robust standard
         deviations, at most a tenth.

@@ -10,6 +10,7 @@ from piezoest._checks import FloatArray, array_1d
 from piezoest.compile import Vector, compiled
 from piezoest.fitting.bursts import LONGEST as LONGEST_BURST
 from piezoest.fitting.bursts import bursts, wild
+from piezoest.fitting.clipping import Top, flat_tops
 from piezoest.fitting.coordinates import bridged
 from piezoest.fitting.held import held
 from piezoest.fitting.jumps import EACH_SIDE, FEWEST_SAMPLES, KINK, UNUSUAL, jumps_of
@@ -39,6 +40,9 @@ SHORTEST_DROPOUT, MOVED_IN_DROPOUT = 8, 50.0
 MOST, FAR_INSIDE = 0.6, 0.02
 # Part of what the voltage moves by which the reading then jumps.
 JUMPED = 0.2
+# The displacement is clipped where the voltage goes on by this part of its range, if a line explains so much
+# of its mean square.
+GOES_ON, RELATED = 0.04, 0.5
 
 
 class Flaws(NamedTuple):
@@ -55,11 +59,20 @@ class Flaws(NamedTuple):
     voltage: BoolArray
     # Repetitions of the reading before, where the sensor measures less often than the log has samples.
     repeated: BoolArray
+    tops: tuple[Top, ...] = ()  # where the displacement is clipped, above and below
+
+    @property
+    def clipped(self) -> BoolArray:
+        """Samples at which the displacement is clipped, shape (N,)."""
+        marks = np.zeros_like(self.spikes)
+        for top in self.tops:
+            marks |= top.samples
+        return marks
 
     @property
     def unusable(self) -> BoolArray:
         """Samples that a fit should leave out, shape (N,)."""
-        return self.spikes | self.dropouts | self.voltage | self.repeated
+        return self.spikes | self.dropouts | self.voltage | self.repeated | self.clipped
 
     def without(self, u: FloatArray) -> FloatArray:
         """The voltage [V] with NaN where it is wrong."""
@@ -76,6 +89,7 @@ class Flaws(NamedTuple):
             self.rests[rests],
             self.voltage[:end],
             self.repeated[:end],
+            tuple(top._replace(samples=top.samples[:end]) for top in self.tops),
         )
 
 
@@ -131,7 +145,21 @@ def _of_readings(found: Flaws, u: FloatArray, x: FloatArray, known: BoolArray, u
     alone, dropouts = found.spikes.copy(), found.dropouts.copy()
     alone[place[spikes & known]] = True
     dropouts[place[lost]] = True
-    return found._replace(spikes=alone, dropouts=dropouts, jumps=place[jumps], jump_sizes=sizes)
+    tops = _clipped(log, place, found.spikes.size)
+    return found._replace(spikes=alone, dropouts=dropouts, jumps=place[jumps], jump_sizes=sizes, tops=tops)
+
+
+def _clipped(log: _Log, place: IntArray, size: int) -> tuple[Top, ...]:
+    """Where the displacement stands at a limit; marks of a log of so many samples, looked at in `place`."""
+    related = float(np.corrcoef(log.late, log.x)[0, 1])
+    if related * related < RELATED:
+        return ()
+    found = []
+    for top in flat_tops(log.x, np.sign(related) * log.u, GOES_ON):
+        samples = np.zeros(size, dtype=np.bool_)
+        samples[place[top.samples]] = True
+        found.append(top._replace(samples=samples))
+    return tuple(found)
 
 
 def _long_gaps(u: FloatArray, wrong: BoolArray) -> BoolArray:

@@ -28,9 +28,6 @@ class Examined:
         self.flaws: Flaws = flawed(record.voltage, record.displacement)
         self.u = bridged(self.flaws.without(record.voltage))
         self.x = bridged(np.where(self.flaws.unusable, np.nan, record.displacement))
-        # With what stands still: at a limit a sensor does so, too.
-        lost = self.flaws.unusable & ~self.flaws.dropouts
-        self.shown = bridged(np.where(lost, np.nan, record.displacement))
         self.swing = float(np.ptp(self.u))
         # A staircase that is answered late is off by whole steps for as long.
         stepped = np.ptp(self.x) > 0.0 and goes_in_steps(self.u)

@@ -7,11 +7,12 @@ from typing import Literal
 
 import numpy as np
 
+from piezoest.fitting.clipping import Top, flat_tops
 from piezoest.fitting.held import repeats
 from piezoest.fitting.runs import BoolArray
-from piezoest.identification.clipping import flat_tops, levels
 from piezoest.identification.examined import FEWEST_SAMPLES, FEWEST_TURNS, Examined
 from piezoest.identification.feedback_in_log import answer
+from piezoest.identification.steps_of_converter import levels
 from piezoest.records import Record
 from piezoest.records.source import counted
 
@@ -29,6 +30,8 @@ CLOCKWISE, MOST_BRANCHES = 0.015, 0.8
 # Deviation from a straight line, relative to the stroke, that no piezo stage keeps to; a doubtful one.
 STRAIGHT, ALMOST_STRAIGHT = 1e-3, 1e-2
 UNITY = 5e-3
+# The voltage is clipped where the displacement goes on by this part of its range: more than a stage rings.
+GOES_ON = 0.08
 FEWEST_LEVELS, FEW_LEVELS = 30.0, 150.0
 MANY_SPIKES = 5e-3
 DRIFT = 0.05
@@ -243,21 +246,28 @@ def _closed_loop(log: Examined) -> Iterator[Finding]:
 
 
 def _limits(log: Examined) -> Iterator[Finding]:
+    for top in log.flaws.tops:
+        yield _clipped(
+            "displacement", "µm", top, f"the voltage goes on by up to {top.beyond:.3g} V",
+            "these stretches say nothing about the stage, identify leaves them out; reduce the voltage.",
+        )  # fmt: skip
     sign = 1.0 if log.gain >= 0.0 else -1.0
-    # A stage that is stopped rings, so it must go further than a voltage.
-    for name, unit, y, other_name, other_unit, other, goes_on in (
-        ("displacement", "µm", log.shown, "voltage", "V", log.u, 0.04),
-        ("voltage", "V", log.u, "displacement", "µm", log.x, 0.08),
-    ):
-        top = flat_tops(y, sign * other, goes_on) if log.related else None
+    tops = flat_tops(log.u, sign * log.x, GOES_ON) if log.related else ()
+    for top in tops[:1]:
         # A rest in which the stage swings once is no limit of the voltage yet.
-        if top and (name == "displacement" or top.times > 1):
-            yield doubt(
-                f"clipped {name}",
-                f"The {name} stands at {top.limit:.5g} {unit} {counted(top.times)} while the {other_name} "
-                f"goes on by up to {top.beyond:.3g} {other_unit} and comes back: it is clipped there; leave "
-                "these stretches out, or reduce the voltage.",
-            )
+        if top.times > 1:
+            yield _clipped(
+                "voltage", "V", top, f"the displacement goes on by up to {top.beyond:.3g} µm",
+                "leave these stretches out, or reduce the voltage.",
+            )  # fmt: skip
+
+
+def _clipped(name: str, unit: str, top: Top, beyond: str, what_to_do: str) -> Finding:
+    return doubt(
+        f"clipped {name}",
+        f"The {name} stands at {top.limit:.5g} {unit} {counted(top.times)} while {beyond} and comes back: it "
+        f"is clipped there; {what_to_do}",
+    )
 
 
 def _resolution(log: Examined) -> Iterator[Finding]:

@@ -1,11 +1,11 @@
-"""Readings that end at a limit, or come in coarse steps."""
+"""Where a column of a log ends at a limit: a sensor or a recorder at the end of its range, or a stop."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.runs import runs
+from piezoest.fitting.runs import BoolArray, runs
 from piezoest.fitting.surprise import noise_in
 
 # A column is at its limit within this part of its range.
@@ -23,24 +23,26 @@ class Top(NamedTuple):
     limit: float  # value at which it stands
     times: int  # how many stretches
     beyond: float  # how far the other one goes on, in its unit
+    samples: BoolArray  # marks of their samples, shape (N,)
 
 
-def flat_tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
-    """Find where a column is clipped: the other one goes on by a part of its range; None if it is not."""
-    for sign in (1.0, -1.0):
-        if found := _tops(sign * y, sign * other, goes_on):
-            return Top(sign * found.limit, found.times, found.beyond)
-    return None
+def flat_tops(y: FloatArray, other: FloatArray, goes_on: float) -> tuple[Top, ...]:
+    """Find where a column is clipped, above and below: the other one goes on by a part of its range."""
+    above, below = _tops(y, other, goes_on), _tops(-y, -other, goes_on)
+    lower = below._replace(limit=-below.limit) if below else None
+    return tuple(top for top in (above, lower) if top)
 
 
 def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
     extent, reach, top = float(np.ptp(y)), float(np.ptp(other)), float(y.max())
     noise = noise_in(np.diff(y, 3))
     tolerance = min(max(AT_LIMIT * extent, 7.0 * noise), 0.02 * extent)
-    if _stands_only_at(y, top):
+    exact = _stands_only_at(y, top)
+    if exact:
         tolerance, goes_on = 0.0, EXACTLY * goes_on
-    starts, ends = runs(y >= top - tolerance)
-    beyond = []
+    there = y >= top - tolerance
+    starts, ends = runs(there)
+    beyond, samples = [], there if exact else np.zeros_like(there)
     for start, end in zip(starts[:MOST_TOPS], ends[:MOST_TOPS], strict=True):
         part = other[start:end]
         on, back = float(part.max() - part[0]), float(part.max() - part[-1])
@@ -48,24 +50,12 @@ def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
         amid = EARLY < np.argmax(part) / (end - start) < 1.0 - EARLY
         if end - start > 5 and amid and min(on, back) > goes_on * reach and back > BACK * on:
             beyond.append(on)
-    return Top(top, len(beyond), max(beyond)) if beyond else None
+            samples[start:end] = True
+    return Top(top, len(beyond), max(beyond), samples) if beyond else None
 
 
 def _stands_only_at(y: FloatArray, top: float) -> bool:
-    """Whether a column with noise repeats its greatest value, and hardly any other."""
-    same = np.diff(y) == 0.0
-    there = same & (y[1:] == top)
-    return bool(np.sum(there) >= FEWEST_REPEATS and np.sum(same & ~there) < SELDOM * y.size)
-
-
-def levels(y: FloatArray) -> tuple[float, float]:
-    """Step of a column's values and how many of them its range holds; the count is infinite without steps."""
-    values = np.unique(y)
-    apart = np.diff(values)
-    extent = float(np.ptp(y))
-    apart = apart[apart > 1e-9 * extent]
-    if not apart.size:
-        return 0.0, np.inf
-    step = float(np.min(apart))
-    whole = np.abs(apart / step - np.rint(apart / step))
-    return (step, extent / step) if np.median(whole) < 0.01 else (0.0, np.inf)
+    """Whether a column with noise repeats its greatest value, and but for its least one hardly any other."""
+    same, value = np.diff(y) == 0.0, y[1:]
+    others = same & (value != top) & (value != y.min())
+    return bool(np.sum(same & (value == top)) >= FEWEST_REPEATS and np.sum(others) < SELDOM * y.size)
