@@ -15,6 +15,8 @@ BACK, MOST_TOPS, EARLY = 0.3, 10_000, 0.15
 # A limit at which noise ends, too: repeated so often where other values are repeated in this part of the log
 # at most. Then the other column needs to go on by this part only.
 FEWEST_REPEATS, SELDOM, EXACTLY = 10, 0.01, 0.1
+# No sensor has less noise than this part of the range.
+SILENT = 1e-5
 
 
 class Top(NamedTuple):
@@ -37,7 +39,8 @@ def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
     extent, reach, top = float(np.ptp(y)), float(np.ptp(other)), float(y.max())
     noise = noise_in(np.diff(y, 3))
     tolerance = min(max(AT_LIMIT * extent, 7.0 * noise), 0.02 * extent)
-    exact = _stands_only_at(y, top)
+    # Both ends of a raster without noise are repeated, too.
+    exact = _stands_only_at(y, (top, float(y.min())) if noise > SILENT * extent else (top,))
     if exact:
         tolerance, goes_on = 0.0, EXACTLY * goes_on
     there = y >= top - tolerance
@@ -54,8 +57,8 @@ def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
     return Top(top, len(beyond), max(beyond), samples) if beyond else None
 
 
-def _stands_only_at(y: FloatArray, top: float) -> bool:
-    """Whether a column with noise repeats its greatest value, and but for its least one hardly any other."""
+def _stands_only_at(y: FloatArray, limits: tuple[float, ...]) -> bool:
+    """Whether a column repeats the first of its limits, and but for these hardly any other value."""
     same, value = np.diff(y) == 0.0, y[1:]
-    others = same & (value != top) & (value != y.min())
-    return bool(np.sum(same & (value == top)) >= FEWEST_REPEATS and np.sum(others) < SELDOM * y.size)
+    repeats, others = int(np.sum(same & (value == limits[0]))), same & ~np.isin(value, limits)
+    return repeats >= FEWEST_REPEATS and int(np.sum(others)) < SELDOM * y.size
