@@ -151,7 +151,7 @@ def _of_readings(found: Flaws, u: FloatArray, x: FloatArray, known: BoolArray, u
 
 def _clipped(log: _Log, place: IntArray, size: int) -> tuple[Top, ...]:
     """Where the displacement stands at a limit; marks of a log of so many samples, looked at in `place`."""
-    related = float(np.corrcoef(log.late, log.x)[0, 1])
+    related = float(np.corrcoef(log.late, log.x)[0, 1]) if np.ptp(log.x) > 0.0 else 0.0
     if related * related < RELATED:
         return ()
     found = []
