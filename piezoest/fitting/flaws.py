@@ -141,25 +141,29 @@ def _of_readings(found: Flaws, u: FloatArray, x: FloatArray, known: BoolArray, u
     off = _bursts(log, lost | unknown)
     spikes, clean = _spikes(log, lost | unknown)
     spikes = _isolated(spikes | off)
-    jumps, sizes = jumps_of(log, clean, spikes | lost | ~known, unknown)
-    alone, dropouts = found.spikes.copy(), found.dropouts.copy()
-    alone[place[spikes & known]] = True
-    dropouts[place[lost]] = True
-    tops = _clipped(log, place, found.spikes.size)
-    return found._replace(spikes=alone, dropouts=dropouts, jumps=place[jumps], jump_sizes=sizes, tops=tops)
+    tops = _clipped(log)
+    clipped = np.any([top.samples for top in tops], axis=0) if tops else np.zeros_like(lost)
+    # Where the displacement comes to a limit or leaves it, the voltage does not tell what it does.
+    jumps, sizes = jumps_of(log, clean, spikes | lost | clipped | ~known, unknown | clipped)
+
+    def whole(marks: BoolArray) -> BoolArray:
+        out = np.zeros_like(found.spikes)
+        out[place[marks]] = True
+        return out
+
+    return found._replace(
+        spikes=found.spikes | whole(spikes & known),
+        dropouts=found.dropouts | whole(lost),
+        jumps=place[jumps],
+        jump_sizes=sizes,
+        tops=tuple(top._replace(samples=whole(top.samples)) for top in tops),
+    )
 
 
-def _clipped(log: _Log, place: IntArray, size: int) -> tuple[Top, ...]:
-    """Where the displacement stands at a limit; marks of a log of so many samples, looked at in `place`."""
+def _clipped(log: _Log) -> tuple[Top, ...]:
+    """Where the displacement stands at a limit, if it is related to the voltage."""
     related = float(np.corrcoef(log.late, log.x)[0, 1]) if np.ptp(log.x) > 0.0 else 0.0
-    if related * related < RELATED:
-        return ()
-    found = []
-    for top in flat_tops(log.x, np.sign(related) * log.u, GOES_ON):
-        samples = np.zeros(size, dtype=np.bool_)
-        samples[place[top.samples]] = True
-        found.append(top._replace(samples=samples))
-    return tuple(found)
+    return flat_tops(log.x, np.sign(related) * log.u, GOES_ON) if related * related > RELATED else ()
 
 
 def _long_gaps(u: FloatArray, wrong: BoolArray) -> BoolArray:

@@ -24,8 +24,8 @@ class Examined:
 
     def __init__(self, record: Record) -> None:
         self.record, self.rate = record, record.sample_rate
-        self.counts = record.usable
         self.flaws: Flaws = flawed(record.voltage, record.displacement)
+        self.counts = record.usable & ~self.flaws.clipped
         self.u = bridged(self.flaws.without(record.voltage))
         self.x = bridged(np.where(self.flaws.unusable, np.nan, record.displacement))
         self.swing = float(np.ptp(self.u))

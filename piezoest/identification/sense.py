@@ -116,7 +116,7 @@ def _basic(record: Record) -> Iterator[Finding]:
 
 
 def _missing(log: Examined) -> Iterator[Finding]:
-    share = 1.0 - float(np.mean(log.counts))
+    share = 1.0 - float(np.mean(log.record.usable))
     if share > MOST_MISSING:
         yield doubt(
             "missing", f"{100 * share:.0f} % of the samples are missing: cut the log to where it is whole."

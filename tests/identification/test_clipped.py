@@ -5,6 +5,8 @@ import pytest
 
 import piezoest as pz
 from piezoest.fitting.flaws import flawed
+from piezoest.identification.sense import findings
+from piezoest.records import Record
 
 FS, NOISE = 2000.0, 2e-3
 TRUE = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
@@ -29,3 +31,11 @@ def test_what_is_clipped_is_marked() -> None:
     assert [top.limit for top in tops] == [3.0, -3.0]
     np.testing.assert_array_equal(flawed(U, x).clipped, np.abs(x) == 3.0)
     np.testing.assert_array_equal(flawed(U, x).before(8000).clipped, np.abs(x[:8000]) == 3.0)
+
+
+@pytest.mark.parametrize(("low", "high"), [(-20.0, 3.0), (-0.5, 0.5)])
+def test_nothing_else_is_said_of_a_clipped_log(low: float, high: float) -> None:
+    x = np.clip(X, low, high)
+    assert not flawed(U, x).jumps.size
+    doubts = [each.name for each in findings(Record.from_arrays(U, x, FS)) if each.severity == "doubt"]
+    assert set(doubts) == {"clipped displacement"}
