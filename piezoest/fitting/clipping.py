@@ -35,6 +35,14 @@ def flat_tops(y: FloatArray, other: FloatArray, goes_on: float) -> tuple[Top, ..
     return tuple(top for top in (above, lower) if top)
 
 
+def marked(tops: tuple[Top, ...], size: int) -> BoolArray:
+    """Marks of all samples in flat tops of a log of so many samples."""
+    marks = np.zeros(size, dtype=np.bool_)
+    for top in tops:
+        marks |= top.samples
+    return marks
+
+
 def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
     extent, reach, top = float(np.ptp(y)), float(np.ptp(other)), float(y.max())
     noise = noise_in(np.diff(y, 3))

@@ -10,7 +10,7 @@ from piezoest._checks import FloatArray, array_1d
 from piezoest.compile import Vector, compiled
 from piezoest.fitting.bursts import LONGEST as LONGEST_BURST
 from piezoest.fitting.bursts import bursts, wild
-from piezoest.fitting.clipping import Top, flat_tops
+from piezoest.fitting.clipping import Top, flat_tops, marked
 from piezoest.fitting.coordinates import bridged
 from piezoest.fitting.held import held
 from piezoest.fitting.jumps import EACH_SIDE, FEWEST_SAMPLES, KINK, UNUSUAL, jumps_of
@@ -64,10 +64,7 @@ class Flaws(NamedTuple):
     @property
     def clipped(self) -> BoolArray:
         """Samples at which the displacement is clipped, shape (N,)."""
-        marks = np.zeros_like(self.spikes)
-        for top in self.tops:
-            marks |= top.samples
-        return marks
+        return marked(self.tops, self.spikes.size)
 
     @property
     def unusable(self) -> BoolArray:
@@ -142,7 +139,7 @@ def _of_readings(found: Flaws, u: FloatArray, x: FloatArray, known: BoolArray, u
     spikes, clean = _spikes(log, lost | unknown)
     spikes = _isolated(spikes | off)
     tops = _clipped(log)
-    clipped = np.any([top.samples for top in tops], axis=0) if tops else np.zeros_like(lost)
+    clipped = marked(tops, lost.size)
     # Where the displacement comes to a limit or leaves it, the voltage does not tell what it does.
     jumps, sizes = jumps_of(log, clean, spikes | lost | clipped | ~known, unknown | clipped)
 
