@@ -69,9 +69,9 @@ class Face(Copied):
 
         ``samples`` written, with a reading or without, ``missing`` references, ``stage``: the
         phase of the work, not the piezo stage (``"seeking"``, ``"approaching"``, ``"running"``,
-        ``"homing"``), ``driving`` (``"line"``, ``"recorded loop"`` or the name of an estimator), ``fault`` of
-        the readings (empty if none), samples whose voltage was limited by the range (``saturated``) or by the
-        slew rate (``slewed``), ``switches`` of the model.
+        ``"homing"``), ``driving`` (``"line"``, the name of an estimator, ``"Duhem model"`` or ``"recorded
+        loop"``), ``fault`` of the readings (empty if none), samples whose voltage was limited by the range
+        (``saturated``) or by the slew rate (``slewed``), ``switches`` of the model.
         """
         state = self._state
         counted = ("samples", "missing", "saturated", "slewed", "switches")
@@ -97,7 +97,7 @@ class Face(Copied):
         """All that can drive, the line first, the recorded loop last: frozen records.
 
         Each has a ``name``, ``missed`` (its recent error, root mean square [µm]; None if nothing is known),
-        ``drives`` and ``model``; for the recorded loop, this is the best of the others.
+        ``drives`` and ``model``; for the Duhem model and the recorded loop, this is the best of the others.
         """
         driving = int(self._state["driving"])
         misses = shown.misses(self._state)
@@ -110,16 +110,17 @@ class Face(Copied):
         """The model that drives, in µm and V; None until the gain is known.
 
         A `LinearGain`, `ColemanHodgdon` or `PrandtlIshlinskii`. While it takes over from another one, the
-        voltage is not its own yet. The recorded loop is no such model: while it drives, this is the best of
-        the others.
+        voltage is not its own yet. While the Duhem model or the recorded loop drives, this is the best of the
+        others.
         """
         return self._model(int(self._state["driving"]))
 
     def _model(self, number: int) -> Model | None:
-        """The line, or the model of an estimator; for the recorded loop the best of them."""
+        """The line, or the model of an estimator; for what has no such model the best of them."""
         if number > len(self._estimators):
             misses = shown.misses(self._state)
-            known = [i for i in range(number) if misses[i] is not None and self._model(i) is not None]
+            own = range(len(self._estimators) + 1)
+            known = [i for i in own if misses[i] is not None and self._model(i) is not None]
             number = min(known, key=lambda i: misses[i] or 0.0, default=0)
         if number == 0:
             return shown.line(self._state)

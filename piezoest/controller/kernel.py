@@ -40,7 +40,7 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         confirmed=AMOUNT, railed=AMOUNT, frozen=AMOUNT, beyond=COUNT,
         # The model that drives, 0 for the line; what the line owes; swings since the last change of model,
         # least number before the next one, changes so far.
-        driving=whole(0.0, slots.MOST + 1.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,
+        driving=whole(0.0, slots.MOST + 2.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,
         # Candidates get z = (x - zero)/unit; half the swing that they began with, zero before [V].
         unit=NUMBER, zero=MEASURED, scale=AMOUNT,
         # Whether the reference goes on small after a wide way; whether it is noted that reference or voltage
@@ -65,7 +65,7 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED, feedback=FIXED,
         # Samples of the shortest period that is far from the resonance, zero if that is unknown.
         shortest=FIXED, allowed=outside.ALLOWED,
-        # Number of the recorded loop among the candidates, -1 without any.
+        # Number of the recorded loop among the candidates, behind the Duhem model; -1 without any.
         recorded=FIXED,
         start=starts.SETTINGS, candidates=candidate_settings,
     )  # fmt: skip

@@ -5,7 +5,17 @@ from typing import Any
 
 from piezoest._checks import finite, fraction, instance, integer, moderate, non_negative, positive
 from piezoest.compensators.limits import VoltageLimits, check_rate
-from piezoest.controller import candidate, homing, kernel, pace, recorded_loop, recorder, slots
+from piezoest.controller import (
+    candidate,
+    duhem,
+    duhem_rls,
+    homing,
+    kernel,
+    pace,
+    recorded_loop,
+    recorder,
+    slots,
+)
 from piezoest.controller.feedback import FASTEST
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import Record, new
@@ -137,6 +147,9 @@ def room(
         values.append({"estimator": estimator.state})
         given.append({"estimator": estimator.settings, "inverse": inverse, "by_path": 1.0})
     if estimators:
+        pairs.append(candidate.layouts(duhem_rls.LAYOUTS, duhem.LAYOUTS))
+        values.append({"estimator": duhem_rls.values()})
+        given.append({"inverse": {"p": duhem.LINE}})
         pairs.append(candidate.layouts(recorder.LAYOUTS, recorded_loop.LAYOUTS))
         values.append({})
         given.append({"estimator": {"fine": recorder.LONG * sample_rate}})

@@ -24,8 +24,8 @@ DEFAULT: tuple[Factory, ...] = (HysteresisRLS, OutputErrorRLS, PrandtlIshlinskii
 KNOWN = (*DEFAULT, HysteresisEKF)
 # Inverses whose numbers a controller can hand over.
 INVERSES = (loop_inverse, play_inverse)
-# Name of the recorded loop; a controller with at least one estimator has it.
-RECORDED = "recorded loop"
+# Names of what a controller with at least one estimator has beside them.
+DUHEM, RECORDED = "Duhem model", "recorded loop"
 # Least and largest gain of a first model.
 LEAST, MOST = 0.1, 10.0
 # What they begin with: a loop of the usual width, and noise, in half swings.
@@ -77,14 +77,14 @@ def checked(name: str, estimator: Any) -> None:
 
 
 def names(estimators: tuple[CompiledEstimator, ...]) -> tuple[str, ...]:
-    """Names of the line, of the estimators and of the recorded loop; a second one of a class is numbered."""
+    """Names of all candidates, the line first; a second estimator of a class is numbered."""
     found = ["line"]
     for estimator in estimators:
         name, number = type(estimator).__name__, 2
         while name in found:
             name, number = f"{type(estimator).__name__} {number}", number + 1
         found.append(name)
-    return (*found, RECORDED) if estimators else tuple(found)
+    return (*found, DUHEM, RECORDED) if estimators else tuple(found)
 
 
 def saved(estimator: CompiledEstimator) -> dict[str, Any]:

@@ -284,7 +284,8 @@ def test_calls_that_cannot_be_change_nothing(call: str, arguments: dict[str, Any
 def test_estimators_are_made_for_a_gain_of_one() -> None:
     factories = (pz.HysteresisRLS, functools.partial(pz.HysteresisRLS, memory=0.4), pz.HysteresisEKF)
     made = team.made(factories, FS)
-    assert team.names(made) == ("line", "HysteresisRLS", "HysteresisRLS 2", "HysteresisEKF", team.RECORDED)
+    own = ("HysteresisRLS", "HysteresisRLS 2", "HysteresisEKF")
+    assert team.names(made) == ("line", *own, team.DUHEM, team.RECORDED)
     assert all(0.5 < each.model.line[0] < 2.0 for each in made)
     assert made[1].to_dict()["arguments"]["memory"] == 0.4
 
@@ -293,7 +294,7 @@ def test_estimators_are_made_for_a_gain_of_one() -> None:
 def test_the_model_is_in_micrometres(estimators: Any) -> None:
     driver = controller(estimators)
     assert driver.model is None
-    assert [each.model for each in driver.candidates] == [None] * (1 if estimators == () else 5)
+    assert [each.model for each in driver.candidates] == [None] * (1 if estimators == () else 6)
     assert all(each.missed is None for each in driver.candidates)
     u, x, _ = drive(driver, pz.SimulatedStage(FS, LOOP), triangle(20) + 3.0)
     missed = {each.name: each.missed for each in driver.candidates}
@@ -306,7 +307,7 @@ def test_the_model_is_in_micrometres(estimators: Any) -> None:
     assert (driving.name, driving.model) == (driver.status.driving, driver.model)
     if estimators is None:
         assert driving.name != "line"
-        kinds = [type(each.model) for each in driver.candidates[:-1]]
+        kinds = [type(each.model) for each in driver.candidates[:-2]]
         assert kinds == [pz.LinearGain, pz.ColemanHodgdon, pz.ColemanHodgdon, pz.PrandtlIshlinskii]
 
 

@@ -1,0 +1,169 @@
+"""The Duhem model: another law up than down, and stages that drift to their loop."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+from piezoest.bench.zoo.duhem import Duhem
+from piezoest.controller import duhem, duhem_rls, team
+from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
+from piezoest.layout import MEASURED, Named, new, record
+from tests.controller.shared import LIMITS, drive, in_blocks
+
+FS = 5000.0
+# What `candidate` has around an inverse.
+AROUND = record(voltage=MEASURED, inverse=duhem.STATE)
+GIVEN = record(inverse=duhem.MODEL)
+# A loop up and another one down, in units in which the line has slope one.
+BOTH = (0.9, 0.2, 0.05, -0.8, 0.8, -0.1, 0.1, 0.5)
+
+
+def placed(p: Any, u: float, x: float) -> tuple[Any, Any]:
+    """An inverse that uses a model, at a voltage and a displacement."""
+    given = Named(new(GIVEN, inverse={"p": p, "x": x}), GIVEN)
+    own = Named(new(AROUND, voltage=u), AROUND)
+    duhem.place(own, given)
+    return own, given
+
+
+def follows(p: Any, u: FloatArray) -> FloatArray:
+    """Displacement of a model along a voltage that begins at zero."""
+    own, given = placed(p, 0.0, 0.0)
+    x = np.empty_like(u)
+    for k, u_k in enumerate(u.tolist()):
+        duhem.follow(own, given, np.nan, u_k)
+        own.voltage = u_k
+        x[k] = duhem.expected(own, given)
+    return x
+
+
+def learnt(u: FloatArray, x: FloatArray, state: Any = None) -> Any:
+    """State of the estimator after a record."""
+    state = Named(new(duhem_rls.STATE, **duhem_rls.values()), duhem_rls.STATE) if state is None else state
+    for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+        duhem_rls.sample(state, None, u_k, x_k)
+    return state
+
+
+def triangle(periods: int, samples: int = 1000) -> FloatArray:
+    return pz.signals.triangle(1.0, 1.0, periods, float(samples)).values
+
+
+def test_the_papers_model_is_one_of_these() -> None:
+    """(1) of the paper: the same parameters in both directions, but for two signs."""
+    model = pz.ColemanHodgdon(alpha=0.8, beta=0.7, gamma=0.72)
+    p = (model.beta, model.gamma, 0.0, -model.alpha, model.beta, -model.gamma, 0.0, model.alpha)
+    u = 0.8 * triangle(3) + 0.2 * np.sin(np.arange(3000) / 150.0)
+    expected = pz.SimulatedStage(1.0, model).run(u)
+    np.testing.assert_allclose(follows(p, u), expected, rtol=0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_inverse_is_exact_wherever_it_turns(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    own, given = placed(BOTH, 0.0, 0.0)
+    r = np.interp(np.arange(0.0, 19.0, rng.uniform(0.005, 0.05)), np.arange(20), rng.uniform(-1.0, 1.0, 20))
+    for r_k in np.repeat(r, rng.integers(1, 3, r.size)).tolist():
+        wanted = duhem.wanted(own, given, r_k)
+        duhem.follow(own, given, wanted, wanted)
+        own.voltage = wanted
+        # Both are exact to the second order in the change of a sample.
+        assert duhem.expected(own, given) == pytest.approx(r_k, abs=2e-5)
+        own.inverse.x = r_k
+
+
+@pytest.mark.parametrize("p", [(0.0,) * 8, (1e9,) * 8, (-1e9,) * 8, (1.0, 0.0, 0.0, 1e9) * 2])
+@pytest.mark.parametrize("r", [-1e9, -1.0, 1e-12, 1e9])
+def test_the_slope_is_never_zero_nor_endless(p: Any, r: float) -> None:
+    own, given = placed(p, 0.0, 0.0)
+    wanted = duhem.wanted(own, given, r)
+    assert wanted / r == pytest.approx(np.clip(wanted / r, 1.0 / duhem.STEEPEST, 1.0 / duhem.LEAST))
+    assert np.isfinite(duhem.moved(given.inverse.p, 0.0, 0.0, wanted))
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-4])
+def test_it_learns_a_stage_of_its_kind_in_two_periods(noise: float) -> None:
+    """Also while the stage still drifts: what it then does for two more periods is foreseen."""
+    u = 0.25 * triangle(8) + 0.3 * np.minimum(np.arange(8000) / 250.0, 1.0)
+    x = follows(BOTH, u)
+    seen = x + noise * np.random.default_rng(1).normal(size=x.size)
+    state = learnt(u[:2250], seen[:2250])
+    drifts = abs(x[2250] - x[7250])
+    foreseen = np.empty(2000)
+    at, before = float(state.level), u[2249]
+    for k in range(2000):
+        at = duhem.moved(state.p, at, before, u[2250 + k])
+        foreseen[k], before = at, u[2250 + k]
+    assert drifts > 0.015
+    assert np.abs(foreseen - x[2250:4250]).max() < (0.002 if noise == 0.0 else 0.004)
+
+
+def test_the_displacement_never_runs_away_from_itself() -> None:
+    """Readings that grow by themselves are no hysteresis."""
+    u = triangle(6)
+    x = u * (1.0 + 0.4 * np.arange(u.size) / u.size)
+    state = learnt(u, x)
+    assert state.p[duhem.TERMS - 1] <= 0.0 <= state.p[2 * duhem.TERMS - 1]
+    assert np.abs(follows(state.p, np.tile(triangle(1), 50))).max() < 2.0
+
+
+def test_missing_readings_leave_the_model_as_it_is() -> None:
+    u = triangle(6)
+    x = follows(BOTH, u)
+    gap = x.copy()
+    gap[3100:3800] = np.nan
+    gap[5000::3] = np.nan
+    state, other = learnt(u, gap), learnt(u, x)
+    np.testing.assert_allclose(follows(state.p, u), follows(other.p, u), rtol=0.0, atol=2e-3)
+    # Rests, and readings alone, change nothing.
+    before = np.array(state.p)
+    learnt(np.full(500, u[-1]), np.linspace(x[-1], 5.0, 500), state)
+    np.testing.assert_array_equal(state.p, before)
+
+
+def test_nonsense_leaves_numbers() -> None:
+    rng = np.random.default_rng(0)
+    u = rng.uniform(-1.0, 1.0, 3000) * 10.0 ** rng.uniform(-6.0, 6.0, 3000)
+    x = rng.uniform(-1.0, 1.0, 3000) * 10.0 ** rng.uniform(-6.0, 6.0, 3000)
+    state = learnt(u, np.where(rng.random(3000) < 0.1, np.nan, x))
+    assert np.all(np.isfinite(np.concatenate([state.p, np.ravel(state.P), [state.level]])))
+    assert np.all(np.diag(np.array(state.P)) > 0.0)
+
+
+def test_it_is_handed_over_when_it_has_learnt_something_and_goes_on_from_there() -> None:
+    model = Named(new(duhem.MODEL), duhem.MODEL)
+    u = triangle(4)
+    x = follows(BOTH, u)
+    state = learnt(u[:1], x[:1])
+    assert duhem_rls.write_model(state, None, model) == NO_MODEL
+    learnt(u[1:2000], x[1:2000], state)
+    assert duhem_rls.write_model(state, None, model) == TO_BE_PLACED
+    assert model.x == pytest.approx(x[1999], abs=0.02)
+
+
+@pytest.mark.parametrize("amplitude", [2.0, 5.0])
+@pytest.mark.parametrize("place", [0.0, 20.0])
+def test_a_stage_that_drifts_to_its_loop_settles_in_the_third_period(place: float, amplitude: float) -> None:
+    """Such a stage took ten periods without this model: it drifts by a tenth of the amplitude in each."""
+    stage_model = Duhem(
+        gain=0.2, share=1.0, scale=60.0, centre=0.0, rate_up=0.05, rate_down=0.03, top=14.0, bottom=9.0,
+        tilt=0.2, bend=0.1,
+    )  # fmt: skip
+    stage = pz.SimulatedStage(FS, stage_model, gauge=pz.Gauge(noise=2e-4), seed=2)
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
+    r = pz.signals.triangle(amplitude, 5.0, 6, FS).values + place * 0.1
+    _, x = in_blocks(driver, stage, r, 10)
+    worst = np.abs(r - x).reshape(6, -1).max(axis=1) / amplitude
+    assert worst[2:].max() < 0.012, worst
+
+
+def test_it_has_a_name_and_no_model_of_its_own() -> None:
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
+    assert [each.name for each in driver.candidates][-2:] == [team.DUHEM, team.RECORDED]
+    drive(driver, pz.PaperStage(FS, seed=0), pz.signals.triangle(3.0, 10.0, 4, FS).values)
+    missed = {each.name: each.missed or np.inf for each in driver.candidates}
+    assert missed[team.DUHEM] < 0.2 * missed["line"]
+    assert len(pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=()).candidates) == 1
