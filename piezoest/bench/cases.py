@@ -16,7 +16,8 @@ from piezoest.signals import Signal
 from piezoest.stage import Amplifier, Gauge, PaperStage, SimulatedStage
 
 PAPER = "paper"
-# No estimator was made for these smooth loops. Backlash is an extreme; the others are the models' relatives.
+# No estimator was made for these loops; the controller's Duhem model describes the second. Backlash is an
+# extreme; the others are the models' relatives.
 STRANGERS = ("bouc-wen", "duhem", "relays")
 STAGES = (PAPER, *(name for name in FAMILIES if name != PAPER))
 REACH = Reach(-100.0, 100.0)  # V

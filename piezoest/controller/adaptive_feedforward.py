@@ -26,10 +26,11 @@ class AdaptiveFeedforward(Face):
     """A complete adaptive feed-forward controller that needs only sample rate and voltage limits.
 
     It measures the gain with small steps of the voltage and moves to the reference. Then it learns the
-    hysteresis while it runs, with a straight line and up to four estimators in parallel, and records the last
-    loop for motion that repeats. What had the smallest recent error computes the voltage (it *drives*). The
-    voltage stays in a corridor around the straight line, and always within the limits. Implausible readings
-    are reported in `status` and `events`; nothing is learnt from them, and the straight line drives.
+    hysteresis while it runs, with a straight line, up to four estimators and a Duhem model in parallel, and
+    records the last loop for motion that repeats. What had the smallest recent error computes the voltage (it
+    *drives*). The voltage stays in a corridor around the straight line, and always within the limits.
+    Implausible readings are reported in `status` and `events`; nothing is learnt from them, and the straight
+    line drives.
 
     Parameters
     ----------

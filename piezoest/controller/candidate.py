@@ -1,4 +1,4 @@
-"""A candidate: what learns, such as a compiled estimator, its model, and the model's recent error.
+"""A candidate: what learns (for example, a compiled estimator), its model, and the model's recent error.
 
 The model is simulated along the voltage that was written: its error is that which the stage would have had
 if this model had computed the voltage. Estimator and model work in units in which the line has gain one and

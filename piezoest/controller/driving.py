@@ -22,7 +22,7 @@ PAID, LEAST_LEG = 1.0 / 4.0, 0.1
 # model has learnt much by then.
 BETTER, ENOUGH = 0.8, 0.25
 SOON, FIRST_LEGS = 0.2, 4.0
-# The misses of the Duhem model count so many times: it learns anything fast, also what is soon over.
+# The misses of the Duhem model are multiplied by this: it learns anything fast, also what is soon over.
 UNPROVEN = 1.5
 # Least number of swings between two changes of model. It doubles at each return to the line.
 PATIENCE, LONGEST_PATIENCE = 0.25, 128.0
@@ -129,7 +129,7 @@ def _choose(state: Any, settings: Any) -> float:
         miss = slots.missed(state.candidates, number * 1.0, enough, np.inf) + faked if number > 0 else line
         if number == settings.recorded and state.reference.nested == 0.0:
             miss = np.inf
-        if number == settings.recorded - 1.0:
+        if number == settings.recorded - 1.0:  # the Duhem model
             miss *= UNPROVEN
         if number == state.driving:
             present = miss

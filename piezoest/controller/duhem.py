@@ -5,7 +5,7 @@ Coleman-Hodgdon model, (1) of the paper, has the same loop both ways: beta, gamm
 -gamma, 0, alpha down. Here a stage may also drift to its loop over many swings. The functions are those of an
 inverse, see `piezoest.compensators.inverse_kernel`.
 
-Source: A. Visintin, Differential Models of Hysteresis, Springer 1994, ch. V.
+Source: A. Visintin, Differential Models of Hysteresis, Springer 1994.
 """
 
 from typing import Any
@@ -23,7 +23,7 @@ MODEL = record(p=numbers(2 * TERMS, kind=NUMBER), x=MEASURED)
 LAYOUTS = STATE, MODEL  # of state and settings
 LINE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
-# Least and largest slope. A way longer than STEP is gone in steps, at most MOST of them.
+# Least and largest slope. A way longer than STEP is gone in steps, at most MOST + 1 of them.
 LEAST, STEEPEST, STEP, MOST = 0.1, 10.0, 0.05, 64.0
 
 

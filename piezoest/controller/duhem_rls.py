@@ -1,9 +1,9 @@
 """Learns a Duhem model by recursive least squares.
 
-The displacement is regressed on what the terms of its slope add up to along the way of the voltage. Both
-sides forget along that way. So where the stage has begun does not count, and the noise of a reading is not
-differentiated. The means over a short way make one equation. The functions are those of an estimator's
-kernel, see `piezoest.estimators.compiled.CompiledEstimator`.
+The displacement is regressed on the terms of its slope, summed up along the way of the voltage. These sums
+and the displacement forget old pieces of the way at the same rate. So where the stage began does not count,
+and the noise of a reading is not differentiated. The means over a short way make one equation. The functions
+are those of an estimator's kernel, see `piezoest.estimators.compiled.CompiledEstimator`.
 """
 
 from typing import Any
@@ -16,26 +16,41 @@ from piezoest.compile import like
 from piezoest.controller.duhem import LINE, TERMS, moved
 from piezoest.equations import least_squares, swing
 from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
-from piezoest.layout import AMOUNT, COUNT, COVARIANCE, FLAG, MEASURED, NUMBER, PARAMETER, numbers, record
+from piezoest.layout import (
+    AMOUNT,
+    COUNT,
+    COVARIANCE,
+    DISTANCE,
+    FLAG,
+    MEASURED,
+    NUMBER,
+    PARAMETER,
+    numbers,
+    record,
+)
 
 SIZE = 2 * TERMS
-# Whether there was a reading at all, and one at the last voltage; both of these; where the stage is by model
-# and readings. Regressors and displacement, as sums along the way; their sums over the samples of a short
-# way, its samples and its length; whether anything is learnt. Parameters and their covariance.
+# Whether there was a reading at all; the last voltage; the last reading, its voltage, and the path of the
+# voltage since then; samples of this rest; where the stage is by model and readings. Regressors and
+# displacement, as sums along the way; their sums over the samples of a short way, its samples and its length;
+# whether anything is learnt. Parameters and their covariance.
 STATE = record(
-    __name__, primed=FLAG, seen=FLAG, u=MEASURED, x=MEASURED, level=MEASURED, swing=swing.SWING,
-    phi=numbers(SIZE), z=NUMBER, sums=numbers(SIZE), sum=NUMBER, count=COUNT, length=AMOUNT, learnt=FLAG,
-    p=numbers(SIZE, kind=PARAMETER), P=numbers(SIZE, SIZE, kind=COVARIANCE),
+    __name__, primed=FLAG, u=MEASURED, x=MEASURED, at=MEASURED, path=DISTANCE, rested=COUNT, level=MEASURED,
+    swing=swing.SWING, phi=numbers(SIZE), z=NUMBER, sums=numbers(SIZE), sum=NUMBER, count=COUNT,
+    length=AMOUNT, learnt=FLAG, p=numbers(SIZE, kind=PARAMETER), P=numbers(SIZE, SIZE, kind=COVARIANCE),
 )  # fmt: skip
 LAYOUTS = STATE, record()
 
-# In swings: how long a piece of the way counts in the sums, how long an equation counts, a short way, and the
-# way in which readings correct where the stage is.
-WAY, MEMORY, SHORT, CORRECTED = 0.5, 3.0, 1.0 / 256.0, 1.0 / 16.0
-# Variance of an equation; standard deviations of the parameters, at the beginning and at most.
-R, SPREADS = 4e-6, (0.5, 1.0, 1.0, 3.0)
+# In swings: how far the sums look back, and how far the equations; a short way; the way in which readings
+# correct where the stage is; the longest way between two readings that is learnt from.
+WAY, MEMORY, SHORT, CORRECTED, LONGEST = 0.5, 3.0, 1.0 / 256.0, 1.0 / 16.0, 1.0 / 8.0
+# Variance of an equation; standard deviations of the parameters, at the beginning and at most; share of their
+# squares that each equation adds to the variances, so that rounding does not spoil them.
+R, SPREADS, SHARE = 4e-6, (0.5, 1.0, 1.0, 3.0), 1e-13
+# Rounding that is no turn.
+STRAIGHT = 1e-6
 # Single variances are limited, and not their sum.
-NO_BOUND = 1e100
+NO_BOUND = 1e18
 
 
 def values() -> dict[str, Any]:
@@ -44,18 +59,20 @@ def values() -> dict[str, Any]:
 
 
 @register_jitable
-def _begin_covariance(P: Any) -> None:
-    """All parameters are as uncertain as at the beginning."""
+def _begin_again(p: Any, P: Any) -> None:
+    """Forget all parameters."""
     for i in range(SIZE):
+        p[i] = LINE[i]
         for j in range(SIZE):
             P[i, j] = SPREADS[i % TERMS] ** 2 if i == j else 0.0
 
 
 @register_jitable
 def _limit(P: Any) -> None:
-    """No parameter is more uncertain than at the beginning."""
+    """All parameters become a little more uncertain, and none more than at the beginning."""
     for i in range(SIZE):
         most = SPREADS[i % TERMS]
+        P[i, i] += SHARE * most * most
         if P[i, i] > most * most:
             share = most / np.sqrt(P[i, i])
             for j in range(SIZE):
@@ -83,29 +100,31 @@ def _update(state: Any) -> None:
         sums[i] /= state.count
     y, quadratic = least_squares.innovation(p, P, sums, state.sum / state.count, product)
     forgetting = np.exp(-state.length / MEMORY)
-    if not least_squares.is_covariance(P):
-        _begin_covariance(P)
-    elif least_squares.is_safe(P, y, quadratic + forgetting * R, product):
+    if quadratic >= 0.0 and least_squares.is_safe(P, y, quadratic + forgetting * R, product):
         least_squares.discrete_correction(p, P, y, quadratic, forgetting, R, NO_BOUND, product)
         _limit(P)
         _keep_stable(p, P, TERMS - 1, 1.0)
         _keep_stable(p, P, SIZE - 1, -1.0)
+        p[TERMS - 1] = min(p[TERMS - 1], 0.0)
         state.learnt = 1.0
+    else:
+        # Rounding has spoilt the covariance.
+        _begin_again(p, P)
     for i in range(SIZE):
         sums[i] = 0.0
     state.sum = state.count = state.length = 0.0
 
 
 @register_jitable
-def _learn(state: Any, du: Any, x: Any, gone: Any) -> None:
-    """Take the way to a reading; it is so many swings long."""
-    phi, left = state.phi, np.exp(-gone / WAY)
-    first, u, middle = 0 if du > 0.0 else TERMS, state.u + 0.5 * du, 0.5 * (state.x + x)
+def _learn(state: Any, u: Any, x: Any, gone: Any) -> None:
+    """Take the way from the last reading to this one; it is so many swings long."""
+    phi, left, du = state.phi, np.exp(-gone / WAY), u - state.at
+    first, u, middle = 0 if du > 0.0 else TERMS, state.at + 0.5 * du, 0.5 * (state.x + x)
     for i in range(SIZE):
         phi[i] *= left
     phi[first] += du
     phi[first + 1] += du * u
-    phi[first + 2] += du * u * u
+    phi[first + 2] += du * (u * u + du * du / 12.0)
     phi[first + 3] += du * middle
     state.z = left * state.z + x - state.x
     for i in range(SIZE):
@@ -123,23 +142,25 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     known = np.abs(x) < WILDEST
     if state.primed == 0.0:
         if known:
-            state.primed, state.seen, state.u, state.x, state.level = 1.0, 1.0, u, x, x
+            state.primed, state.u, state.x, state.at, state.level = 1.0, u, x, u, x
             state.swing.furthest = state.swing.turned = u
         return
     du = u - state.u
-    if du == 0.0:
-        # At rest the stage creeps, which would look like hysteresis.
-        return
     swing.follow(state.swing, u)
-    gone = min(np.abs(du) / max(state.swing.size, swing.SMALLEST), 1.0)
+    if du == 0.0:
+        state.rested += 1.0
+        return
+    size = max(state.swing.size, swing.SMALLEST)
+    state.path += np.abs(du)
     state.level = moved(state.p, state.level, state.u, u)
-    # The ways to and from a missing reading are left out, on both sides of the equations.
-    if known and state.seen != 0.0:
-        _learn(state, du, x, gone)
     if known:
-        state.level += min(gone / CORRECTED, 1.0) * (x - state.level)
-        state.x = x
-    state.seen = 1.0 if known else 0.0
+        # Creep in a long rest would look like hysteresis, and a turn between two readings like none.
+        creeps = state.rested > state.swing.usual > 0.0
+        straight = state.path <= (1.0 + STRAIGHT) * np.abs(u - state.at)
+        if straight and state.path <= LONGEST * size and not creeps:
+            _learn(state, u, x, min(state.path / size, 1.0))
+        state.level += min(state.path / size / CORRECTED, 1.0) * (x - state.level)
+        state.x, state.at, state.path, state.rested = x, u, 0.0, 0.0
     state.u = u
 
 

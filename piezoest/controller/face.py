@@ -97,7 +97,7 @@ class Face(Copied):
         """All that can drive, the line first, the recorded loop last: frozen records.
 
         Each has a ``name``, ``missed`` (its recent error, root mean square [µm]; None if nothing is known),
-        ``drives`` and ``model``; for the Duhem model and the recorded loop, this is the best of the others.
+        ``drives`` and ``model``; for the Duhem model and the recorded loop, the best of the others.
         """
         driving = int(self._state["driving"])
         misses = shown.misses(self._state)
@@ -111,7 +111,7 @@ class Face(Copied):
 
         A `LinearGain`, `ColemanHodgdon` or `PrandtlIshlinskii`. While it takes over from another one, the
         voltage is not its own yet. While the Duhem model or the recorded loop drives, this is the best of the
-        others.
+        line and the estimators.
         """
         return self._model(int(self._state["driving"]))
 

@@ -1,4 +1,4 @@
-"""The candidates of a controller beside the line: up to four estimators, Duhem model and recorded loop.
+"""The candidates of a controller beside the line: estimators, Duhem model, recorded loop.
 
 They are a chain: a ``model`` with its estimator, see `piezoest.controller.candidate`, and the ``others``,
 which are None after the last. Functions that do something for all of them are here. After the end of the

@@ -20,6 +20,8 @@ stays in it. It comes as is, without warranty of any kind."""
 
 # What rounding cannot tell apart is more in float, and what is beyond all measure is less.
 COARSER = {
+    ("piezoest.controller.duhem_rls", "SHARE"): 1e-7,
+    ("piezoest.controller.duhem_rls", "STRAIGHT"): 1e-3,
     ("piezoest.equations.bent_plays", "SAME"): 1e-5,
     ("piezoest.equations.least_squares", "LARGEST"): 1e36,
     ("piezoest.equations.least_squares", "TRACE_WEIGHT"): 1e18,

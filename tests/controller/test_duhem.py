@@ -118,10 +118,27 @@ def test_missing_readings_leave_the_model_as_it_is() -> None:
     gap[5000::3] = np.nan
     state, other = learnt(u, gap), learnt(u, x)
     np.testing.assert_allclose(follows(state.p, u), follows(other.p, u), rtol=0.0, atol=2e-3)
-    # Rests, and readings alone, change nothing.
+
+
+def test_a_sensor_that_reads_every_fourth_sample_will_do() -> None:
+    u = triangle(6)
+    x = follows(BOTH, u)
+    state = learnt(u, np.where(np.arange(u.size) % 4 == 0, x, np.nan))
+    np.testing.assert_allclose(follows(state.p, u), x, rtol=0.0, atol=2e-3)
+
+
+@pytest.mark.parametrize("creep", [0.0, 0.05])
+def test_the_creep_of_a_long_rest_is_not_learnt(creep: float) -> None:
+    u = triangle(6)
+    x = follows(BOTH, u)
+    state = learnt(u[:4100], x[:4100])
     before = np.array(state.p)
-    learnt(np.full(500, u[-1]), np.linspace(x[-1], 5.0, 500), state)
+    learnt(np.full(2000, u[4099]), x[4099] + np.linspace(0.0, creep, 2000), state)
     np.testing.assert_array_equal(state.p, before)
+    learnt(u[4100:5000], x[4100:5000] + creep, state)
+    # The level has moved, and not the model.
+    assert state.level == pytest.approx(x[4999] + creep, abs=2e-3)
+    np.testing.assert_allclose(follows(state.p, u), x, rtol=0.0, atol=0.02 if creep else 2e-3)
 
 
 def test_nonsense_leaves_numbers() -> None:
@@ -129,6 +146,7 @@ def test_nonsense_leaves_numbers() -> None:
     u = rng.uniform(-1.0, 1.0, 3000) * 10.0 ** rng.uniform(-6.0, 6.0, 3000)
     x = rng.uniform(-1.0, 1.0, 3000) * 10.0 ** rng.uniform(-6.0, 6.0, 3000)
     state = learnt(u, np.where(rng.random(3000) < 0.1, np.nan, x))
+    assert state.p[duhem.TERMS - 1] <= 0.0 <= state.p[2 * duhem.TERMS - 1]
     assert np.all(np.isfinite(np.concatenate([state.p, np.ravel(state.P), [state.level]])))
     assert np.all(np.diag(np.array(state.P)) > 0.0)
 
@@ -144,17 +162,16 @@ def test_it_is_handed_over_when_it_has_learnt_something_and_goes_on_from_there()
     assert model.x == pytest.approx(x[1999], abs=0.02)
 
 
-@pytest.mark.parametrize("amplitude", [2.0, 5.0])
-@pytest.mark.parametrize("place", [0.0, 20.0])
-def test_a_stage_that_drifts_to_its_loop_settles_in_the_third_period(place: float, amplitude: float) -> None:
-    """Such a stage took ten periods without this model: it drifts by a tenth of the amplitude in each."""
+@pytest.mark.parametrize("amplitude", [1.0, 2.0])
+def test_a_stage_that_drifts_to_its_loop_settles_in_the_third_period(amplitude: float) -> None:
+    """Without this model it missed 11 and 4 % of the amplitude there."""
     stage_model = Duhem(
         gain=0.2, share=1.0, scale=60.0, centre=0.0, rate_up=0.05, rate_down=0.03, top=14.0, bottom=9.0,
         tilt=0.2, bend=0.1,
     )  # fmt: skip
     stage = pz.SimulatedStage(FS, stage_model, gauge=pz.Gauge(noise=2e-4), seed=2)
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
-    r = pz.signals.triangle(amplitude, 5.0, 6, FS).values + place * 0.1
+    r = pz.signals.triangle(amplitude, 5.0, 6, FS).values
     _, x = in_blocks(driver, stage, r, 10)
     worst = np.abs(r - x).reshape(6, -1).max(axis=1) / amplitude
     assert worst[2:].max() < 0.012, worst

@@ -1,4 +1,4 @@
-"""A zoo of rigs: stages that no estimator of the library was made for, and what goes wrong on somebody's rig.
+"""A zoo of rigs: stages of many kinds, and what goes wrong on somebody's rig.
 
 >>> from piezoest.bench.zoo import draw, traced
 >>> rig = draw(7)
