@@ -83,7 +83,7 @@ def _limit(P: Any) -> None:
 
 @register_jitable
 def _without(p: Any, P: Any, up: Any, down: Any) -> None:
-    """Let the slope up, or down, or both not depend on the displacement; the other parameters adapt to that."""
+    """Let the slope up, down or both not depend on the displacement; the other parameters adapt to that."""
     i, j = TERMS - 1, SIZE - 1
     # The least change in units of the uncertainty is along columns of P.
     first, second = p[i] * up, p[j] * down
