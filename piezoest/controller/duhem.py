@@ -70,7 +70,7 @@ def follow(state: Any, settings: Any, wanted: Any, given: Any) -> None:
 @register_jitable
 def expected(state: Any, settings: Any) -> float:
     """Displacement at the last voltage."""
-    return state.inverse.x * 1.0
+    return state.inverse.x
 
 
 @register_jitable

@@ -53,14 +53,9 @@ STRAIGHT = 1e-6
 NO_BOUND = 1e18
 
 
-def values() -> dict[str, Any]:
-    """State at the beginning: a line of slope one."""
-    return {"p": LINE, "P": np.diag(np.square(SPREADS * 2))}
-
-
 @register_jitable
-def _begin_again(p: Any, P: Any) -> None:
-    """Forget all parameters."""
+def _begin(p: Any, P: Any) -> None:
+    """Begin, or begin again, with a line of slope one."""
     for i in range(SIZE):
         p[i] = LINE[i]
         for j in range(SIZE):
@@ -85,7 +80,7 @@ def _limit(P: Any) -> None:
 def _without(p: Any, P: Any, up: Any, down: Any) -> None:
     """Let the slope up, down or both not depend on the displacement; the other parameters adapt to that."""
     i, j = TERMS - 1, SIZE - 1
-    # The least change in units of the uncertainty is along columns of P.
+    # Measured by their uncertainty, the parameters change least along columns of P.
     first, second = p[i] * up, p[j] * down
     both = up * down * P[i, j]
     determinant = P[i, i] * P[j, j] - both * both
@@ -125,7 +120,7 @@ def _update(state: Any) -> None:
         state.learnt = 1.0
     else:
         # Rounding has spoilt the covariance.
-        _begin_again(p, P)
+        _begin(p, P)
     for i in range(SIZE):
         sums[i] = 0.0
     state.sum = state.count = state.length = 0.0
@@ -160,6 +155,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         if known:
             state.primed, state.u, state.x, state.at, state.level = 1.0, u, x, u, x
             state.swing.furthest = state.swing.turned = u
+            _begin(state.p, state.P)
         return
     du = u - state.u
     swing.follow(state.swing, u)

@@ -8,9 +8,14 @@ import numpy as np
 
 import piezoest as pz
 from piezoest._checks import FloatArray
+from piezoest.bench.zoo.duhem import Duhem
 
 LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
 LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+# Another law up than down: it drifts to its loop over many periods.
+DRIFTING = Duhem(
+    gain=0.2, scale=60.0, centre=0.0, rate_up=0.05, rate_down=0.03, top=14.0, bottom=9.0, tilt=0.2, bend=0.1
+)
 
 
 class Run(NamedTuple):
@@ -38,6 +43,16 @@ def drive(
         if k not in left_out:
             driver.learn(told(float(u[k])), read(k, float(x[k])))
     return Run(u, x, doing)
+
+
+def stands_along(inverse: Any, own: Any, given: Any, u: FloatArray) -> FloatArray:
+    """Where a model stands along a voltage, by the functions of its inverse."""
+    stands = np.empty_like(u)
+    for k, u_k in enumerate(u.tolist()):
+        inverse.follow(own, given, np.nan, u_k)
+        own.voltage = u_k
+        stands[k] = inverse.expected(own, given)
+    return stands
 
 
 def late(samples: int, before: float = 0.0) -> Callable[[int, float], float]:

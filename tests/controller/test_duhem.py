@@ -7,11 +7,10 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
-from piezoest.bench.zoo.duhem import Duhem
 from piezoest.controller import duhem, duhem_rls, team
 from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
 from piezoest.layout import MEASURED, Named, new, record
-from tests.controller.shared import LIMITS, drive, in_blocks
+from tests.controller.shared import DRIFTING, LIMITS, drive, in_blocks, stands_along
 
 FS = 5000.0
 # What `candidate` has around an inverse.
@@ -31,18 +30,12 @@ def placed(p: Any, u: float, x: float) -> tuple[Any, Any]:
 
 def follows(p: Any, u: FloatArray) -> FloatArray:
     """Displacement of a model along a voltage that begins at zero."""
-    own, given = placed(p, 0.0, 0.0)
-    x = np.empty_like(u)
-    for k, u_k in enumerate(u.tolist()):
-        duhem.follow(own, given, np.nan, u_k)
-        own.voltage = u_k
-        x[k] = duhem.expected(own, given)
-    return x
+    return stands_along(duhem, *placed(p, 0.0, 0.0), u)
 
 
 def learnt(u: FloatArray, x: FloatArray, state: Any = None) -> Any:
     """State of the estimator after a record."""
-    state = Named(new(duhem_rls.STATE, **duhem_rls.values()), duhem_rls.STATE) if state is None else state
+    state = Named(new(duhem_rls.STATE), duhem_rls.STATE) if state is None else state
     for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
         duhem_rls.sample(state, None, u_k, x_k)
     return state
@@ -165,11 +158,7 @@ def test_it_is_handed_over_when_it_has_learnt_something_and_goes_on_from_there()
 @pytest.mark.parametrize("amplitude", [1.0, 2.0])
 def test_a_stage_that_drifts_to_its_loop_settles_in_the_third_period(amplitude: float) -> None:
     """Without this model it missed 11 and 4 % of the amplitude there."""
-    stage_model = Duhem(
-        gain=0.2, share=1.0, scale=60.0, centre=0.0, rate_up=0.05, rate_down=0.03, top=14.0, bottom=9.0,
-        tilt=0.2, bend=0.1,
-    )  # fmt: skip
-    stage = pz.SimulatedStage(FS, stage_model, gauge=pz.Gauge(noise=2e-4), seed=2)
+    stage = pz.SimulatedStage(FS, DRIFTING, gauge=pz.Gauge(noise=2e-4), seed=2)
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
     r = pz.signals.triangle(amplitude, 5.0, 6, FS).values
     _, x = in_blocks(driver, stage, r, 10)

@@ -12,7 +12,7 @@ from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
 from piezoest.controller import recorded_loop, recorder, team, travel
 from piezoest.estimators import model_writing
 from piezoest.layout import NUMBER, Named, new, record
-from tests.controller.shared import LIMITS, drive
+from tests.controller.shared import LIMITS, drive, stands_along
 
 FS = 5000.0
 # What `candidate` has around an inverse.
@@ -60,12 +60,7 @@ def plays(u: FloatArray) -> FloatArray:
 
 def follows(own: Any, given: Any, u: FloatArray) -> FloatArray:
     """Where the recorded loop stands along a voltage."""
-    stands = np.empty_like(u)
-    for k, u_k in enumerate(u.tolist()):
-        recorded_loop.follow(own, given, np.nan, u_k)
-        own.voltage = u_k
-        stands[k] = recorded_loop.expected(own, given)
-    return stands
+    return stands_along(recorded_loop, own, given, u)
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,11 @@ import pytest
 
 import piezoest as pz
 from piezoest.bench.zoo import draw
-from piezoest.bench.zoo.duhem import Duhem
 from piezoest.bench.zoo.faults import NONE
 from piezoest.controller import team
 from piezoest.controller.faults import FAULTS
 from piezoest.controller.shown import STAGES
+from tests.controller.shared import DRIFTING
 from tests.export.building import compile_strictly, under_sanitizers
 
 FS = 1e4
@@ -158,24 +158,13 @@ def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> N
 @pytest.mark.slow
 def test_the_duhem_model_learns_in_single_precision_too() -> None:
     """Rounding could spoil its covariance; the motion does not repeat, so that no recorded loop drives."""
-    stage_model = Duhem(
-        gain=0.2,
-        scale=60.0,
-        centre=0.0,
-        rate_up=0.05,
-        rate_down=0.03,
-        top=14.0,
-        bottom=9.0,
-        tilt=0.2,
-        bend=0.1,
-    )
     t = np.arange(60_000) / FS
     r = 0.5 * (np.sin(10.0 * np.pi * t) + 0.6 * np.sin(14.6 * np.pi * t) + 0.3 * np.sin(22.2 * np.pi * t))
     library, worst = controller("default"), list[float]()
     number = [each.name for each in library.candidates].index(team.DUHEM)
     for precision in ("double", "float"):
         board = pz.export.CompiledFeedforward(pz.export.c(library, precision=precision))
-        stage = pz.SimulatedStage(FS, stage_model, gauge=pz.Gauge(noise=2e-4), seed=2)
+        stage = pz.SimulatedStage(FS, DRIFTING, gauge=pz.Gauge(noise=2e-4), seed=2)
         x, drove = np.empty_like(r), 0
         for k, r_k in enumerate(r.tolist()):
             u = board.step(r_k)
