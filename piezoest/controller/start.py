@@ -78,9 +78,10 @@ SLEWS, MOST_SLEWING = 0.7, 400.0
 # The way back goes too far by this part of the way, so that no hysteresis is left: one half for small loops,
 # whose branches are parabolas (Rayleigh).
 OVERSHOOT = 0.5
-# Windows before the ways are repeated, twice as many each time; at most so many doublings. Eleven of them
-# are hardly ever whole periods of hum, which would look the same at each try.
-PAUSE, LONGEST_PAUSE = 11.0, 8.0
+# Windows before the ways are repeated, twice as many after two tries; at most so many doublings. Eleven of
+# them are hardly ever whole periods of hum, which would look the same at each try. A dead sensor mostly stays
+# dead: a repeated try ends at the first way without an answer, after each SMALL tries at one twice as long.
+PAUSE, LONGEST_PAUSE, SMALL = 11.0, 8.0, 8.0
 # In a block that is planned before its readings come, the second way begins after so many windows: else a
 # whole block would be lost.
 BLIND = 8.0
@@ -302,8 +303,9 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     answer = start.now - start.from_x
     start.gain_before, start.gain = start.gain, answer / (u - start.from_u) if u != start.from_u else 0.0
     # A sensor that has not changed at all on all ways is tested again by the shortest one only.
-    dead = start.step == 0.0 and start.tries >= 1.0
-    longest = np.abs(start.way) >= settings.start.longest or dead
+    repeated = start.tries >= 1.0
+    longest = np.abs(start.way) >= settings.start.longest or (repeated and start.step == 0.0)
+    far = LONGER * np.abs(start.way) > settings.start.way * 2.0 ** (start.tries / SMALL)
     bound = _clear(start, FEW_STEPS if longest else STEPS)
     clear = u != start.from_u and np.abs(answer) > bound
     at_once = start.windows - _late(start, settings) <= AT_ONCE
@@ -323,7 +325,7 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     if clear and (alike or longest):
         start.stage = DONE
         return
-    if longest:
+    if longest or (repeated and far and not clear):
         # Back to the beginning: the stage is not to rest at a limit.
         start.ways = 0.0
         start.tries += 1.0
@@ -394,5 +396,5 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
     elif start.stage == SILENT:
         start.samples += 1.0
         # Less and less often, because it moves the stage for nothing.
-        if start.samples >= PAUSE * settings.start.window * 2.0 ** min(start.tries, LONGEST_PAUSE):
+        if start.samples >= PAUSE * settings.start.window * 2.0 ** min(0.5 * start.tries, LONGEST_PAUSE):
             start.stage, start.samples, start.way = REST, 0.0, settings.start.way
