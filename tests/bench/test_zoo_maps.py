@@ -1,9 +1,12 @@
 """How soon a controller settles over its map, and whether it is as good as the best single estimator."""
 
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
+import piezoest as pz
 from piezoest.bench.zoo import settling
 from piezoest.bench.zoo.contenders import CANDIDATES, DEFAULT
 from piezoest.bench.zoo.contest import FLOOR, summarise_contest
@@ -28,6 +31,23 @@ def test_shares_count_what_is_asked_for() -> None:
     first = found["by_place"][0]
     assert [first[name] for name in ("runs", "cold-start", "gain-step")] == [20, 1.0, 0.95]
     assert (first["cold-start periods"], first["switch-back periods"]) == (2.0, None)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_inverse_without_error_settles_in_all_places(seed: int) -> None:
+    """Resonance and steps of the voltage leave room: what is asked for can be reached."""
+    for cell in settling.cells([seed], ["paper"]):
+        rig = settling.cell_rig(cell)
+        if not settling.asked(rig):
+            continue
+        straight = pz.LinearGain(rig.gain)
+        stage = replace(rig, model=straight).stage(healthy=True)
+        error = np.abs(rig.reference - stage.run(rig.reference / rig.gain)).reshape(-1, rig.plain.cycle)
+        first = 0
+        for _, factor, periods in SEGMENTS:
+            allowed = max(settling.SETTLED * factor * cell.amplitude, settling.NOISES * rig.noise)
+            assert error[first + 1 : first + periods].max() < 0.6 * allowed, (cell, factor)
+            first += periods
 
 
 def settled(seed: int, controller: str, error: float | None) -> dict[str, Any]:
