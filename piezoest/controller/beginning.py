@@ -28,7 +28,7 @@ def begin_learning(state: Any) -> None:
     state.stage = APPROACH
     start.samples = start.growth = start.left = 0.0
     state.confirmed = starts.farthest(start)
-    state.gone = state.handed = state.railed = state.owed = state.small = 0.0
+    state.gone = state.handed = state.railed = state.owed = state.lean = state.small = 0.0
     state.patience = driving.PATIENCE
     reading.forget(state.readings)
     # The last readings may be from before the start.

@@ -38,9 +38,10 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         # Farthest way from the beginning that was answered; travel of the reference with the voltage at a
         # limit, and with a voltage that stood still; samples with the reference out of reach.
         confirmed=AMOUNT, railed=AMOUNT, frozen=AMOUNT, beyond=COUNT,
-        # The model that drives, 0 for the line; what the line owes; swings since the last change of model,
-        # least number before the next one, changes so far.
-        driving=whole(0.0, slots.MOST + 2.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,
+        # The model that drives, 0 for the line; what the line owes; drift to which the corridor leans [µm];
+        # swings since the last change of model, least number before the next one, changes so far.
+        driving=whole(0.0, slots.MOST + 2.0), owed=NUMBER, lean=NUMBER, since=AMOUNT, patience=AMOUNT,
+        switches=COUNT,
         # Candidates get z = (x - zero)/unit; half the swing that they began with, zero before [V].
         unit=NUMBER, zero=MEASURED, scale=AMOUNT,
         # Whether the reference goes on small after a wide way; whether it is noted that reference or voltage

@@ -247,6 +247,7 @@ def _follow(state: Any, settings: Any, r: Any, u: Any) -> tuple[float, float]:
     moved = travels.follow(state.reference, r)
     left = redraw.kept(state, settings, moved, state.reference.swing)
     state.owed *= left
+    redraw.lean(state, left)
     slots.pay(state.candidates, left)
     gone = travels.follow(state.travel, u)
     if state.stage == RUN:

@@ -20,13 +20,14 @@ POINTS = record(
 # The recent legs in one direction, and their total length [µm].
 LEGS = record(length=DISTANCE, points=POINTS)
 # The line; the lines before the last turn and before the turn before that; the gain at the beginning, and the
-# way of the voltage that showed it [V]; whether the voltage was at a limit since the last turn; legs so far,
-# recent ones that agreed with the line; length of this leg at the last look [V], of the longest recent leg
-# [µm]; direction of the last leg; points of this leg, of the legs before it, and of both directions together.
+# way of the voltage that showed it [V]; how far the line has moved in the last two legs [µm], 0 if unknown;
+# whether the voltage was at a limit since the last turn; legs so far, recent ones that agreed with the line;
+# length of this leg at the last look [V], of the longest recent leg [µm]; direction of the last leg; points of
+# this leg, of the legs before it, and of both directions together.
 LINE = record(
     gain=NUMBER, centre=NUMBER, last_gain=NUMBER, last_centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER,
-    first_gain=NUMBER, first_leg=DISTANCE, clipped=FLAG, legs=COUNT, agreed=AMOUNT, looked=AMOUNT,
-    longest=DISTANCE, direction=SIGN, now=POINTS, up=LEGS, down=LEGS, both=POINTS,
+    first_gain=NUMBER, first_leg=DISTANCE, drift=NUMBER, clipped=FLAG, legs=COUNT, agreed=AMOUNT,
+    looked=AMOUNT, longest=DISTANCE, direction=SIGN, now=POINTS, up=LEGS, down=LEGS, both=POINTS,
 )  # fmt: skip
 
 # Share of the readings' mean square that a line must explain: for points to be straight, to show a gain, to
@@ -61,7 +62,7 @@ def begin(line: Any, gain: Any, u: Any, x: Any, leg: Any) -> None:
     """Begin with a line through a point; legs shorter than half of `leg` are not looked at."""
     line.gain = line.last_gain = line.held_gain = line.first_gain = gain
     line.centre = line.last_centre = line.held_centre = x - gain * u
-    line.agreed = line.legs = line.longest = line.direction = 0.0
+    line.agreed = line.legs = line.longest = line.direction = line.drift = 0.0
     line.first_leg, line.looked = leg, 0.25 * leg
     forget_legs(line)
     forget(line.now)
@@ -204,16 +205,19 @@ def turn(line: Any, direction: Any, leg: Any) -> None:
     line.legs += 1.0
     line.held_gain, line.held_centre = line.last_gain, line.last_centre
     line.last_gain, line.last_centre = line.gain, line.centre
+    answers = False
     if leg > SHORT * line.longest:
         ratio = np.sign(now.product) * spread(now) / line.gain
-        agrees = explained(now) > SIGNED and 1.0 / ALIKE < ratio < ALIKE
-        line.agreed = line.agreed + 1.0 if agrees else 0.5 * line.agreed
+        answers = explained(now) > SIGNED and ratio > 1.0 / ALIKE
+        line.agreed = line.agreed + 1.0 if answers and ratio < ALIKE else 0.5 * line.agreed
     if direction > 0.0:
         _take(line.up, now, leg, kept)
         _through_both(line, line.up, line.down, direction, leg)
     else:
         _take(line.down, now, leg, kept)
         _through_both(line, line.down, line.up, direction, leg)
+    u = line.both.mean_u
+    line.drift = at(line, u) - (line.held_gain * u + line.held_centre) if answers else 0.0
     line.clipped = line.looked = 0.0
     forget(now)
 
@@ -257,6 +261,7 @@ def hold(line: Any) -> None:
     """Return to the line before the last two turns, and forget the points since."""
     line.gain, line.centre = line.held_gain, line.held_centre
     line.last_gain, line.last_centre = line.gain, line.centre
+    line.drift = 0.0
     forget(line.now)
     forget_legs(line)
 

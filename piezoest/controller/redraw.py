@@ -72,6 +72,14 @@ def draw(state: Any) -> None:
 
 
 @register_jitable
+def lean(state: Any, left: Any) -> None:
+    """Let the corridor lean to where the line drifts; slowly, a fraction `left` of the way is left."""
+    # Motion that does not repeat moves the line, too.
+    drift = state.line.drift if state.reference.alike != 0.0 else 0.0
+    state.lean = drift + (state.lean - drift) * left
+
+
+@register_jitable
 def follow(state: Any) -> None:
     """Move a line that is far off to the recent readings, which cannot wait for two legs."""
     before = driving.line_z(state)

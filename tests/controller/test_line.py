@@ -49,6 +49,20 @@ def test_a_way_back_of_few_readings_leaves_nothing_old() -> None:
     assert abs(line.centre - 1.0) < 0.02
 
 
+def test_the_drift_is_that_of_a_period_and_unknown_where_the_stage_hardly_answers() -> None:
+    line = Named(new(lines.LINE), lines.LINE)
+    lines.begin(line, 0.2, 0.0, 0.0, 1.0)
+    for k in range(20):
+        _leg(line, 0.2, -0.1 * k, 1.0 - 2.0 * (k % 2), 50)
+    assert line.drift == pytest.approx(-0.2, rel=1e-3)
+    _leg(line, 0.02, -2.0, 1.0, 50)
+    assert line.drift == 0.0
+    _leg(line, 0.2, -2.0, -1.0, 50)
+    assert line.drift != 0.0
+    lines.hold(line)
+    assert line.drift == 0.0
+
+
 @pytest.mark.parametrize(("answer", "gain"), [(0.02, 0.2), (0.6, 2.0)])
 def test_a_line_that_became_too_steep_comes_back_where_little_moves(answer: float, gain: float) -> None:
     """Behind ringing a tenth of the voltage is left, which a stage with backlash hardly answers."""

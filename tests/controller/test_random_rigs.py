@@ -35,7 +35,7 @@ def test_what_hysteresis_leaves_of_a_wide_way_does_not_refute_the_start(seed: in
 def test_a_start_waits_until_a_slow_amplifier_is_there() -> None:
     """500 V/s: while it came down from a limit, the gain was found with the wrong sign, for ever."""
     rig, _, run = driven(22688)
-    assert largest(rig, run, 4.0, 5.5) < 0.1
+    assert largest(rig, run, 4.0, 5.5) < 0.15
 
 
 def test_a_sensor_that_recovers_is_no_late_answer() -> None:
