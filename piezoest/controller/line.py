@@ -22,8 +22,8 @@ LEGS = record(length=DISTANCE, points=POINTS)
 # The line; the lines before the last turn and before the turn before that; the gain at the beginning, and the
 # way of the voltage that showed it [V]; how far the line has moved in the last two legs [µm], 0 if unknown;
 # whether the voltage was at a limit since the last turn; legs so far, recent ones that agreed with the line;
-# length of this leg at the last look [V], of the longest recent leg [µm]; direction of the last leg; points of
-# this leg, of the legs before it, and of both directions together.
+# length of this leg at the last look [V], of the longest recent leg [µm]; direction of the last leg; points
+# of this leg, of the legs before it, and of both directions together.
 LINE = record(
     gain=NUMBER, centre=NUMBER, last_gain=NUMBER, last_centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER,
     first_gain=NUMBER, first_leg=DISTANCE, drift=NUMBER, clipped=FLAG, legs=COUNT, agreed=AMOUNT,
