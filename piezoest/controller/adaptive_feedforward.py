@@ -45,7 +45,8 @@ class AdaptiveFeedforward(Face):
         initial_model=..., noise=...)``: they work in units of half a swing, in which the gain is about one.
     corridor : float
         Largest distance of the voltage from the straight line, as a fraction of half the widest recent
-        swing, 0 to 1.
+        swing, 0 to 1. Where a stage drifts it is up to three times as much on that side, but not more than
+        half the swing.
     gain : float, optional
         Approximate gain of the stage [µm/V]; negative if the displacement falls with the voltage. It is
         checked at the start. If it is wrong by more than a factor of three, the gain is measured.

@@ -22,7 +22,7 @@ from piezoest.controller.voltage import HOME, RUN, SEEK, plan, written
 from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, Field, record, whole
 from piezoest.layout import Record as Layout
 
-# Half-width of the corridor, as a fraction of half the widest swing of the reference of late.
+# Half-width of the corridor without drift, as a fraction of half the widest swing of the reference of late.
 WIDTH = 0.4
 
 

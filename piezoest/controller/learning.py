@@ -38,8 +38,9 @@ NEAR, LONGEST = 0.05, 50.0
 # The gain on the way counts if the mean of the recent readings has gone this fraction of it. It is at least
 # this fraction of the gain from the start: in the dead zone after a turn the stage hardly answers.
 LEAST_WAY, LEAST_GAIN = 0.4, 0.5
-# A way so many times as long as those of the start shows how the gain grows.
-MUCH_LONGER = 1.5
+# A way so many times as long as those of the start shows how the gain grows: with a power of the way, at most
+# the second number.
+MUCH_LONGER, MOST_GROWTH = 1.5, 0.6
 # If the voltage rests at a limit and the stage is beyond the reference, the line follows the readings after
 # this travel of the reference, in swings.
 BEYOND = 0.1
@@ -130,6 +131,12 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
 
 
 @register_jitable
+def _growth(ratio: Any, longer: Any) -> float:
+    """The power of the way that a gain grows with; `ratio` of gains and `longer` of ways."""
+    return min(np.log(max(ratio, 1.0)) / np.log(longer), MOST_GROWTH)
+
+
+@register_jitable
 def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
     """Draw the line again with a reading on the way to the reference; single wrong ones do not count."""
     start, line, recent = state.start, state.line, state.readings.recent
@@ -153,7 +160,7 @@ def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
             line.gain = gain if gain / least > 1.0 else least
             longer = way / starts.farthest(start)
             if longer > MUCH_LONGER:
-                start.growth = starts.growth(line.gain / start.gain, longer)
+                start.growth = _growth(line.gain / start.gain, longer)
     if state.stage != SEEK:
         line.centre = recent.mean_x - line.gain * recent.mean_u
     return x

@@ -42,9 +42,10 @@ START = record(
     # To check a known gain: sums of the ways and of the answers; answer at the last look, samples before the
     # next one. How late the stage answers [samples].
     gone=NUMBER, answered=NUMBER, largest=AMOUNT, look=AMOUNT, lag=AMOUNT,
-    # Gain of the last way [µm/V], of the one before; the gain grows with this power of the way; ways without
-    # an answer; samples in a row without a reading, or with another voltage than planned; the first readings.
-    gain=NUMBER, gain_before=NUMBER, growth=AMOUNT, tries=AMOUNT, stuck=COUNT,
+    # Gain of the last way [µm/V], of the one before; the gain grows with this power of the way; tries without
+    # an answer, whether one of them went all the way; samples in a row without a reading, or with another
+    # voltage than planned; the first readings.
+    gain=NUMBER, gain_before=NUMBER, growth=AMOUNT, tries=AMOUNT, tried=FLAG, stuck=COUNT,
     first=numbers(FIRST, kind=MEASURED),
     # Whether the gain is the user's and not confirmed yet; readings in a row for it, all readings against it.
     given=FLAG, agreed=COUNT, doubted=COUNT,
@@ -78,15 +79,13 @@ SLEWS, MOST_SLEWING = 0.7, 400.0
 # The way back goes too far by this part of the way, so that no hysteresis is left: one half for small loops,
 # whose branches are parabolas (Rayleigh).
 OVERSHOOT = 0.5
-# Windows before the ways are repeated, twice as many after two tries; at most so many doublings. Eleven of
-# them are hardly ever whole periods of hum, which would look the same at each try. A dead sensor mostly stays
-# dead: a repeated try ends at the first way without an answer, after each SMALL tries at one twice as long.
+# Windows before a try is repeated, twice as many after every two tries; at most so many doublings. Eleven are
+# hardly ever whole periods of hum, which would look the same at each try. A dead sensor mostly stays dead: a
+# repeated try ends at the first way if that has no answer; each SMALLth one goes on, each time one way more.
 PAUSE, LONGEST_PAUSE, SMALL = 11.0, 8.0, 8.0
 # In a block that is planned before its readings come, the second way begins after so many windows: else a
 # whole block would be lost.
 BLIND = 8.0
-# Largest power that the gain grows with.
-MOST_GROWTH = 0.6
 
 
 @register_jitable
@@ -94,7 +93,7 @@ def begin(start: Any, u: Any) -> None:
     """Begin at rest at a voltage."""
     start.voltage = start.origin = u
     start.stage = REST
-    start.samples = start.ways = start.tries = 0.0
+    start.samples = start.ways = start.tries = start.tried = 0.0
 
 
 @register_jitable
@@ -148,7 +147,7 @@ def begin_again(start: Any, settings: Any, u: Any, x: Any) -> None:
 def rest_at(start: Any, settings: Any, u: Any, x: Any, gain: Any) -> None:
     """The stage rests, and the reading is x: go the first way, or none if the gain is known and not zero."""
     start.from_x = start.zero = start.now = x
-    way = min(max(settings.start.way, start.least), settings.start.longest)
+    way = _first(start, settings)
     start.way = way if settings.maximum - u >= u - settings.minimum else -way
     _go(start, settings, u)
     if gain != 0.0:
@@ -273,21 +272,21 @@ def _clear(start: Any, steps: Any) -> float:
 
 
 @register_jitable
+def _first(start: Any, settings: Any) -> float:
+    """Length of the first way [V]."""
+    return min(max(settings.start.way, start.least), settings.start.longest)
+
+
+@register_jitable
 def _is_first(start: Any, settings: Any) -> bool:
     """Whether the present way is a first one: no longer one, and no way back."""
-    return 0.0 < np.abs(start.way) <= max(settings.start.way, start.least)
+    return 0.0 < np.abs(start.way) <= _first(start, settings)
 
 
 @register_jitable
 def _late(start: Any, settings: Any) -> float:
     """Windows by which an answer may be late and sure."""
     return min(start.waited, AT_ONCE) if start.tries == 0.0 and _is_first(start, settings) else 0.0
-
-
-@register_jitable
-def growth(ratio: Any, longer: Any) -> float:
-    """The power of the way that a gain grows with; `ratio` of gains and `longer` of ways."""
-    return min(np.log(max(ratio, 1.0)) / np.log(longer), MOST_GROWTH)
 
 
 @register_jitable
@@ -303,9 +302,10 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     answer = start.now - start.from_x
     start.gain_before, start.gain = start.gain, answer / (u - start.from_u) if u != start.from_u else 0.0
     # A sensor that has not changed at all on all ways is tested again by the shortest one only.
-    repeated = start.tries >= 1.0
-    longest = np.abs(start.way) >= settings.start.longest or (repeated and start.step == 0.0)
-    far = LONGER * np.abs(start.way) > settings.start.way * 2.0 ** (start.tries / SMALL)
+    dead = start.step == 0.0 and start.tries >= 1.0
+    longest = np.abs(start.way) >= settings.start.longest or dead
+    farthest_way = _first(start, settings) * LONGER ** (start.tries / SMALL)
+    enough = start.tries % SMALL != 0.0 or np.abs(start.way) >= farthest_way
     bound = _clear(start, FEW_STEPS if longest else STEPS)
     clear = u != start.from_u and np.abs(answer) > bound
     at_once = start.windows - _late(start, settings) <= AT_ONCE
@@ -325,9 +325,9 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     if clear and (alike or longest):
         start.stage = DONE
         return
-    if longest or (repeated and far and not clear):
+    if longest or (start.tried != 0.0 and enough and not clear):
         # Back to the beginning: the stage is not to rest at a limit.
-        start.ways = 0.0
+        start.ways, start.tried = 0.0, 1.0
         start.tries += 1.0
         beyond = start.origin - OVERSHOOT * (u - start.origin)
         _go_back(start, u, min(max(beyond, settings.minimum), settings.maximum))
@@ -342,7 +342,7 @@ def _wait(start: Any, settings: Any, u: Any, known: Any, middle: Any) -> None:
     beyond = (u - start.target) * np.sign(start.way)
     if start.ahead != 0.0:
         start.samples += 1.0
-        if _is_first(start, settings) and start.samples >= blind(settings):
+        if start.tried == 0.0 and _is_first(start, settings) and start.samples >= blind(settings):
             _go_on(start, settings, u)
     elif known and 0.0 < beyond <= LONGER * np.abs(start.way):
         # The next way of a block began before the stage rested: both are one.

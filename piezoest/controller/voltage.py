@@ -15,8 +15,9 @@ from piezoest.controller import travel as travels
 # The gain is sought; the voltage goes to where the reference needs it; all is learnt; hysteresis is erased.
 SEEK, APPROACH, RUN, HOME = 0.0, 1.0, 2.0, 3.0
 # The corridor reaches at most so many times as far from the line as the line has missed recently. It is wider
-# where the line drifts to, by so many times the drift of two legs: the line is where the loop was then.
-WIDER, LEANS = 2.0, 2.0
+# where the line drifts to, by so many times the drift of two legs, as the line is where the loop was then; at
+# most by so many times its width, and not farther than half the swing.
+WIDER, DRIFTS, ASIDE = 2.0, 2.0, 2.0
 # The voltage of a model moves at most so many times as fast as that of the line.
 RATE = 5.0
 # On the way to the reference the voltage goes at most so many times as far as was answered, before a user's
@@ -72,11 +73,12 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
         wanted = min(max(wanted, state.u + ahead - most), state.u + ahead + most)
     if not np.abs(wanted) < WILDEST:
         wanted = straight
-    room = np.abs(settings.corridor * 0.5 * max(swing, travels.widest(state.reference)) / line.gain)
+    half = np.abs(0.5 * max(swing, travels.widest(state.reference)) / line.gain)
     # No model can be better than the line by more than the line has missed recently.
     missed = np.abs(state.unit) * state.widest + 3.0 * np.sqrt(state.readings.noise)
-    room = min(room, WIDER * missed / np.abs(line.gain))
-    wider = min(max(LEANS * state.lean / line.gain, -LEANS * room), LEANS * room)
+    room = min(settings.corridor * half, WIDER * missed / np.abs(line.gain))
+    most = min(ASIDE * room, half - room)
+    wider = min(max(DRIFTS * state.lean / line.gain, -most), most)
     return min(max(wanted, straight - room - max(wider, 0.0)), straight + room - min(wider, 0.0))
 
 

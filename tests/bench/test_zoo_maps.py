@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import piezoest as pz
+from piezoest.bench.metrics import SETTLED
 from piezoest.bench.zoo import settling
 from piezoest.bench.zoo.contenders import CANDIDATES, DEFAULT
 from piezoest.bench.zoo.contest import FLOOR, summarise_contest
@@ -45,7 +46,7 @@ def test_an_inverse_without_error_settles_in_all_places(seed: int) -> None:
         error = np.abs(rig.reference - stage.run(rig.reference / rig.gain)).reshape(-1, rig.plain.cycle)
         first = 0
         for _, factor, periods in SEGMENTS:
-            allowed = max(settling.SETTLED * factor * cell.amplitude, settling.NOISES * rig.noise)
+            allowed = max(SETTLED * factor * cell.amplitude, settling.NOISES * rig.noise)
             assert error[first + 1 : first + periods].max() < 0.6 * allowed, (cell, factor)
             first += periods
 
