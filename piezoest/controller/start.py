@@ -81,8 +81,8 @@ SLEWS, MOST_SLEWING = 0.7, 400.0
 OVERSHOOT = 0.5
 # Windows before a try is repeated, twice as many after every two tries; at most so many doublings. Eleven are
 # hardly ever whole periods of hum, which would look the same at each try. A dead sensor mostly stays dead: a
-# repeated try ends at the first way if that has no answer; each SMALLth one goes on, each time one way more.
-PAUSE, LONGEST_PAUSE, SMALL = 11.0, 8.0, 8
+# repeated try ends at the first way if that has no answer. One in so many goes on, each time by one more way.
+PAUSE, LONGEST_PAUSE, ONE_IN = 11.0, 8.0, 8
 # In a block that is planned before its readings come, the second way begins after so many windows: else a
 # whole block would be lost.
 BLIND = 8.0
@@ -304,8 +304,8 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     # A sensor that has not changed at all on all ways is tested again by the shortest one only.
     dead = start.step == 0.0 and start.tries >= 1.0
     longest = np.abs(start.way) >= settings.start.longest or dead
-    far = LONGER * np.abs(start.way) > _first(start, settings) * LONGER ** (start.tries / SMALL)
-    enough = far or int(start.tries) % SMALL != 0
+    far = LONGER * np.abs(start.way) > _first(start, settings) * LONGER ** (start.tries / ONE_IN)
+    enough = far or int(start.tries) % ONE_IN != 0
     bound = _clear(start, FEW_STEPS if longest else STEPS)
     clear = u != start.from_u and np.abs(answer) > bound
     at_once = start.windows - _late(start, settings) <= AT_ONCE

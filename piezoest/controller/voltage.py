@@ -73,11 +73,11 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
         wanted = min(max(wanted, state.u + ahead - most), state.u + ahead + most)
     if not np.abs(wanted) < WILDEST:
         wanted = straight
-    half = np.abs(0.5 * max(swing, travels.widest(state.reference)) / line.gain)
+    half_swing = np.abs(0.5 * max(swing, travels.widest(state.reference)) / line.gain)
     # No model can be better than the line by more than the line has missed recently.
     missed = np.abs(state.unit) * state.widest + 3.0 * np.sqrt(state.readings.noise)
-    room = min(settings.corridor * half, WIDER * missed / np.abs(line.gain))
-    most = min(ASIDE * room, half - room)
+    room = min(settings.corridor * half_swing, WIDER * missed / np.abs(line.gain))
+    most = min(ASIDE * room, half_swing - room)
     wider = min(max(DRIFTS * state.lean / line.gain, -most), most)
     return min(max(wanted, straight - room - max(wider, 0.0)), straight + room - min(wider, 0.0))
 
