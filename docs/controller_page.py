@@ -31,10 +31,10 @@ def pieces(parity: Document, target: Document) -> dict[str, str]:
         "near": of_all(sum(row["float_difference"] <= NEAR for row in runs), len(runs)),
         "limit": percent(NEAR),
         "double": f"{least:.0f}",
-        "tools": "; ".join(target["tools"]),
     }
+    emulated = replacements("target", {"tools": "; ".join(target["tools"])}, target)
     return {
-        "numbers": replacements("controller", numbers),
+        "numbers": replacements("controller", numbers, parity) + emulated,
         "parity": table_of(
             "Generated C compared with the library; settled error: mean of ten periods' largest errors",
             runs,

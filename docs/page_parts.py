@@ -14,7 +14,7 @@ from typing import Any
 from piezoest._files import write_text
 from piezoest._tables import Columns, cells_of, shown
 from piezoest.bench import report
-from piezoest.bench.origin import machine_of
+from piezoest.bench.origin import code_of_parts, machine_of
 from piezoest.bench.report import Table
 from piezoest.bench.scenarios import UNREPEATED
 
@@ -31,11 +31,23 @@ SPEED = {
 UNSETTLED = (
     "in *settles*, fewer than half of the runs settle; in other columns, it was not run there, or not timed."
 )
+# Folders of the package whose code makes the numbers of a document.
+RUNS = ("compensators", "equations", "estimators", "models", "signals", "stage")
+CONTROLLED, FITTED = (*RUNS, "controller"), ("equations", "fitting", "models", "symbolic")
+ABOUT = {
+    "controller": CONTROLLED, "logs": (*FITTED, "identification", "bench/zoo"), "paper": RUNS,
+    "policies": (*RUNS, "policies"), "real_data": (*FITTED, "identification", "records"),
+    "safety": (*CONTROLLED, "bench/zoo"), "speed": (*CONTROLLED, "export"), "table": (*CONTROLLED, *FITTED),
+    "target": (*CONTROLLED, "export"), "tuning": RUNS,
+}  # fmt: skip
 
 
 def read(name: str) -> Document:
-    """What docs/data/NAME.json holds."""
-    return dict(json.loads((DOCS / "data" / f"{name}.json").read_text(encoding="utf-8")))
+    """What docs/data/NAME.json holds; with ``changed``, where the code has changed since it was made."""
+    document = dict(json.loads((DOCS / "data" / f"{name}.json").read_text(encoding="utf-8")))
+    before, now = document["code"], code_of_parts()
+    changed = sorted(part for part in set(ABOUT[name]) if before.get(part) != now[part])
+    return {**document, "changed": changed}
 
 
 def write_page(page: Any, app: Any = None) -> None:
@@ -45,7 +57,12 @@ def write_page(page: Any, app: Any = None) -> None:
     where nothing changed, so that no rebuild follows. No line ends before a per cent sign.
     """
     name = page.__name__.removesuffix("_page")
-    texts = page.pieces(*map(read, getattr(page, "SOURCES", (name,))))
+    documents = {source: read(source) for source in getattr(page, "SOURCES", (name,))}
+    for source, document in documents.items():
+        if document["changed"]:
+            parts = ", ".join(document["changed"])
+            print(f"docs/data/{source}.json is older than the code of {parts}: make figures, or make safety")
+    texts = page.pieces(*documents.values())
     target = DOCS / "generated" / name
     target.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
@@ -107,7 +124,9 @@ def cold_start(document: Document) -> str:
 def replacements(prefix: str, values: dict[str, Any], document: Document | None = None) -> str:
     """Substitutions for numbers that stand in sentences; with a document, when and where it was made, too."""
     if document is not None:
-        values = {"date": document["date"][:10], "machine": machine_of(document), **values}
+        date, changed = document["date"][:10], ", ".join(document["changed"])
+        since = f" (since then the code of {changed} has changed)" if changed else ""
+        values = {"date": date + since, "machine": machine_of(document), **values}
     return "".join(f".. |{prefix} {name}| replace:: {value}\n" for name, value in values.items())
 
 

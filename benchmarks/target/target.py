@@ -21,7 +21,7 @@ from cycles import count_cycles
 
 import piezoest as pz
 from piezoest._options import one_of
-from piezoest.bench.origin import put
+from piezoest.bench.origin import origin, put
 from piezoest.bench.scenarios import SCENARIOS
 
 HERE = Path(__file__).resolve().parent
@@ -193,7 +193,8 @@ def main(
         print(", ".join(f"{name} {value}" for name, value in row.items()))
     if json is not None:
         tools = [printed(name, "--version").splitlines()[0] for name in (f"{CROSS}gcc", EMULATOR)]
-        put({"clock_Hz": CLOCK, "sample_rate_Hz": SAMPLE_RATE, "tools": tools, "rows": rows}, json)
+        head = {**origin(), "clock_Hz": CLOCK, "sample_rate_Hz": SAMPLE_RATE, "tools": tools}
+        put({**head, "rows": rows}, json)
     sys.exit(any(not row["largest_difference_from_host"] < 1e-5 for row in rows))
 
 

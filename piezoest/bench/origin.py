@@ -12,6 +12,7 @@ import platform
 import re
 import sys
 import time
+import tokenize
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,10 @@ from piezoest._files import write_text
 
 # This package and those that do its arithmetic.
 DISTRIBUTIONS = ("piezoest", "numpy", "scipy", "numba", "casadi", "filterpy")
+PACKAGE = Path(__file__).resolve().parents[1]
+DIGITS = 16  # of a fingerprint
+# Tokens before the first one of a statement: a string that comes then is a docstring.
+BEGINS = (tokenize.ENCODING, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
 
 
 def cpu_name() -> str:
@@ -30,14 +35,37 @@ def cpu_name() -> str:
 
 
 @functools.cache
-def fingerprint() -> str:
-    """Sixteen hexadecimal digits that change with every file of this package's own source."""
-    root = Path(__file__).resolve().parents[1]
-    found = hashlib.sha256()
+def code_of_parts(root: Path = PACKAGE) -> dict[str, str]:
+    """What this package's own source is, by folder: digits that change with all but comments and docstrings.
+
+    `root`: where the package is; another version of it may be elsewhere.
+    """
+    found: dict[str, Any] = {}
     for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".json", ".csv")):
-        found.update(path.relative_to(root).as_posix().encode())
-        found.update(path.read_bytes())
-    return found.hexdigest()[:16]
+        part = found.setdefault(path.parent.relative_to(root).as_posix(), hashlib.sha256())
+        part.update(path.name.encode())
+        part.update(_tokens(path) if path.suffix == ".py" else path.read_bytes())
+    return {name: part.hexdigest()[:DIGITS] for name, part in found.items()}
+
+
+def _tokens(path: Path) -> bytes:
+    """A module without comments, empty lines and docstrings."""
+    found, begins = [], True
+    with path.open("rb") as file:
+        for token in tokenize.tokenize(file.readline):
+            if token.type in BEGINS:
+                begins = True
+            elif token.type not in (tokenize.COMMENT, tokenize.NL):
+                if not (begins and token.type == tokenize.STRING):
+                    found.append(token.string)
+                begins = False
+    return "\0".join(found).encode()
+
+
+@functools.cache
+def fingerprint() -> str:
+    """Hexadecimal digits that change with this package's own code."""
+    return hashlib.sha256(repr(code_of_parts()).encode()).hexdigest()[:DIGITS]
 
 
 def code_of(text: str) -> str:
@@ -45,7 +73,7 @@ def code_of(text: str) -> str:
     source = source_of(text)
     if source is None:
         return fingerprint()
-    return f"{fingerprint()}-{hashlib.sha256(source.read_bytes()).hexdigest()[:16]}"
+    return f"{fingerprint()}-{hashlib.sha256(source.read_bytes()).hexdigest()[:DIGITS]}"
 
 
 def source_of(text: str) -> Path | None:
@@ -84,6 +112,7 @@ def origin(began: float | None = None) -> dict[str, Any]:
             "python": f"{platform.python_implementation()} {platform.python_version()}",
         },
         "versions": {name: importlib.metadata.version(name) for name in DISTRIBUTIONS},
+        "code": code_of_parts(),
     }
     return head if began is None else {**head, "seconds": round(time.perf_counter() - began, 1)}
 

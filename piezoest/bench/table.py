@@ -168,7 +168,6 @@ def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) 
     overview = [_overview(frame, text, plan) for text in plan.everything]
     document = {
         "suite": "table",
-        "code": fingerprint(),
         "plan": asdict(plan),
         "conditions": asdict(Conditions(**plan.given)),
         "scenarios": {

@@ -1,11 +1,15 @@
 """README and documentation: their numbers are those of docs/data, their links and tests are there."""
 
 import importlib
+import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+
+from piezoest.bench.origin import code_of_parts, origin
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -20,6 +24,23 @@ def test_readme_has_the_figures_of_the_data(monkeypatch: pytest.MonkeyPatch) -> 
     readme = program("readme", monkeypatch)
     _, inside, _ = readme.parts((ROOT / "README.md").read_text(encoding="utf-8"))
     assert inside == readme.figures(), "run python docs/readme.py"
+
+
+def test_a_page_says_that_it_is_older_than_the_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    parts = program("page_parts", monkeypatch)
+    page = SimpleNamespace(__name__="tuning_page", pieces=lambda document: {})
+    monkeypatch.setattr(parts, "DOCS", tmp_path)
+    (tmp_path / "data").mkdir()
+    for other, changed in (({}, []), ({"stage": "0", "cli": "0"}, ["stage"])):
+        text = json.dumps(origin() | {"code": code_of_parts() | other})
+        (tmp_path / "data" / "tuning.json").write_text(text, encoding="utf-8")
+        document = parts.read("tuning")
+        assert document["changed"] == changed
+        parts.write_page(page)
+        for said in (capsys.readouterr().out, parts.replacements("tuning", {}, document)):
+            assert ("code of stage" in said) == bool(changed)
 
 
 GOOD = (
