@@ -25,8 +25,9 @@ TEXT = """
 The first table names the best estimator over {stages} simulated stages. Its errors are those on the simulated
 stage of the paper, in % of the amplitude. The first three rows give the geometric mean of the largest errors
 of all periods after the change. *A small first error* and *Long rests* give the largest error of the first
-period, the other rows the settled error. The simulated stage of the paper is a sum of plays, which real
-stages are not. So PrandtlIshlinskiiRLS is better there in most rows.
+period, the other rows the settled error. The simulated stage of the paper is a sum of plays (elements with
+backlash), as is the model of PrandtlIshlinskiiRLS. So this estimator is better on it in most rows. Real
+stages are not sums of plays.
 
 The second table is of the same stage. *Settles*: periods after a change until every further error is below
 {level:g} %, and the share of runs that settle; *others settle*: this share on the other stages, in the
@@ -37,10 +38,10 @@ last half of the periods. *Step*: one sample, called from Python; for AdaptiveFe
 Geometric means over the scenarios of the medians over {seeds} seeds, {slow} for the slow estimators;
 {machine}, {date}. A dash: {dash}
 
-With a resonance, late readings or backlash the error on your rig is larger, and it takes longer to settle. Of
-{rigs} simulated rigs drawn at random, half of them with a fault, the voltage never left its limits; in
-{share:.0f} % the error was at some time clearly larger than that of a straight line, and in {end:.1f} % it
-was so at the end. See *Safety on unknown rigs* in the documentation.
+With a resonance, late readings or backlash the error on your rig is larger, and it takes longer to settle. On
+{rigs} simulated rigs drawn at random, half of them with a fault, the voltage never left its limits. On
+{share:.0f} % of them the error was at some time clearly larger than that of a straight line, and on
+{end:.1f} % at the end. See *Safety on unknown rigs* in the documentation.
 
 The paper measured {linear_theirs:g} µm with linear feed-forward and {theirs:g} µm with compensation;
 its procedure gives {linear_ours:.2g} µm and {ours:.2g} µm here. On a recording of a real stage that

@@ -92,7 +92,7 @@ def safety(
     """A controller on random rigs: stages of many kinds, and what goes wrong with them.
 
     Each run is a function of its seed. A run is safe if the voltage is finite, within its limits, rests at
-    none of them without need, and the error is not clearly larger than that of the best straight line; the
+    none of them without need, and the error is not clearly larger than that of a straight line; the
     page Safety on unknown rigs defines this. If you stop the command and start it again, it continues.
     """
     shared.check(json_to)

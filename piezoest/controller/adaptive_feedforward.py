@@ -199,8 +199,8 @@ class AdaptiveFeedforward(Face):
         """Start a decaying oscillation of the voltage that erases the memory of the hysteresis.
 
         Use it after a power cut or lost writes, when the past of the voltage is unknown. The next steps
-        ignore the reference. The voltage oscillates around the rest voltage, or around the middle of the
-        limits if there is no room, with decreasing amplitude; `status` shows ``"homing"``. Then the
+        ignore the reference. The voltage oscillates around the one nearest to 0 V, or around the middle of
+        the limits if there is no room, with decreasing amplitude; `status` shows ``"homing"``. Then the
         controller approaches the reference, or measures the gain if it is unknown.
 
         Parameters
