@@ -79,6 +79,8 @@ class IntegralFeedback(AroundCompensator):
         r, x = number_or_nan(r), number_or_nan(x)
         if math.isfinite(x) and math.isfinite(r):
             growth = self._step_gain * min(max(r - x, -self._reach), self._reach)
-            if growth * self._compensator.limited <= 0.0:
+            limited = self._compensator.limited
+            # Where the stage falls as the voltage rises, more displacement is less voltage.
+            if not limited or growth * limited * self._compensator.model.slope <= 0.0:
                 self._integral += growth
         return self._compensator.step(r + self._integral)

@@ -231,6 +231,16 @@ def test_a_wrong_reading_does_not_wind_feedback_up(wrong: float) -> None:
     assert u == pytest.approx(1.0 / 0.15, rel=1e-3)
 
 
+@pytest.mark.parametrize("slope", [0.15, -0.15])
+def test_feedback_does_not_wind_up_at_a_limit(slope: float) -> None:
+    compensator = pz.LinearCompensator(pz.LinearGain(slope), pz.VoltageLimits(-10.0, 10.0))
+    feedback = pz.IntegralFeedback(compensator, gain=5.0, sample_rate=1000.0)
+    for _ in range(2000):
+        feedback.step(5.0, slope * compensator.voltage)
+    assert abs(compensator.voltage) == 10.0
+    assert abs(feedback.integral) < 0.1
+
+
 def test_limits_for_another_rate_are_refused() -> None:
     limits = pz.VoltageLimits(-50.0, 100.0, slew_rate=100.0, sample_rate=1000.0)
     compensator = pz.LinearCompensator(pz.LinearGain(0.15), limits)
