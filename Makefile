@@ -115,7 +115,7 @@ figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the docume
 	$(BIN)/piezoest bench paper --json docs/data/paper.json --figures docs/figures/paper
 	$(BIN)/piezoest bench --tune 8 --output docs/_build/table --json docs/data/table.json --figures docs/figures/table
 	$(BIN)/piezoest bench --only HysteresisRLS $(foreach with,$(POLICIES),-e "HysteresisRLS($(with))") --stage paper --seeds 10 --output docs/_build/policies --json docs/data/policies.json
-	$(BIN)/python benchmarks/logs.py --logs 200 --seed 5000 --json docs/data/logs.json
+	$(BIN)/python benchmarks/logs.py --logs 300 --seed 30000 --json docs/data/logs.json
 	$(BIN)/python benchmarks/controller.py --json docs/data/controller.json
 	$(BIN)/python benchmarks/target/target.py --json docs/data/target.json
 	$(BIN)/python benchmarks/speed.py --json docs/data/speed.json --figure docs/figures/speed.png
