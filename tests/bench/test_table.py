@@ -16,7 +16,7 @@ import piezoest as pz
 from piezoest.bench import figures, recorded, table, tables, tuning
 from piezoest.bench.cases import STAGES, STRANGERS, make_stage
 from piezoest.bench.estimators import KNOWN, PAPERS, candidate, defaults, found
-from piezoest.bench.origin import code_of, fingerprint
+from piezoest.bench.origin import code_of, code_of_parts, fingerprint
 from piezoest.bench.pages import write_html
 from piezoest.bench.run import COLUMNS, Task, crashed, play
 from piezoest.bench.store import append, opened, played, row_of
@@ -133,6 +133,26 @@ def test_an_estimators_own_file_is_part_of_its_code(own: str) -> None:
     with Path(f"{own}.py").open("a", encoding="utf-8") as file:
         file.write("\n# changed\n")
     assert code_of(f"{own}:Still") != before
+
+
+@pytest.mark.parametrize(
+    ("text", "same"),
+    [
+        ('"""Another."""\n\n# Why.\ndef f():\n    """What."""\n    return "a"  # so\n', True),
+        ('def f():\n    return "b"\n', False),
+        ('def f():\n    x = "a"\n    return x\n', False),
+    ],
+)
+def test_comments_and_docstrings_are_no_other_code(text: str, same: bool, tmp_path: Path) -> None:
+    codes = []
+    for version, its in (("before", '"""One."""\ndef f():\n    return "a"\n'), ("after", text)):
+        part = tmp_path / version / "part"
+        part.mkdir(parents=True)
+        (part / "module.py").write_text(its, encoding="utf-8")
+        (tmp_path / version / "other.py").write_text("x = 1\n", encoding="utf-8")
+        codes.append(code_of_parts(tmp_path / version))
+    assert codes[0]["."] == codes[1]["."]
+    assert (codes[0]["part"] == codes[1]["part"]) == same
 
 
 @pytest.mark.parametrize(
