@@ -227,7 +227,8 @@ def track(
         Such as `AdaptiveFeedforward`; it replaces compensator and estimator. The loop then runs sample by
         sample, and the record has no parameters.
     update_interval : int
-        Samples between two updates of the compensator's model (default 50: 1 ms at 50 kHz).
+        Samples after which the compensator may take over a new model (default 50: 1 ms at 50 kHz); see the
+        `model` of `InverseCompensator`.
     sample_rate : float, optional
         [Hz]; needed if r is a plain array and the stage has no sample rate.
     allow_jumps : bool

@@ -25,7 +25,7 @@ KNOWN: dict[str, str] = {
     "HysteresisEKF": "HysteresisEKF(offset=True)",
     "MovingHorizon": "MovingHorizon(process_noise=0.03, offset=True)",
 }
-# The paper's law: 0.4 s is the memory that the simulated stage was calibrated with.
+# The paper's law, with a memory of two periods at 5 Hz.
 PAPERS = "HysteresisRLS(memory=0.4, offset=True)"
 SLOW = ("BatchFit", "FilterPyEKF", "FilterPyUKF", "MovingHorizon")
 

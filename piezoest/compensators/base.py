@@ -30,7 +30,7 @@ class CompensatorStatus:
     missing : int
         Samples without a usable reference: the voltage was held.
     projected : bool
-        Whether the model set last was inadmissible and its nearest admissible one is used.
+        Whether the model set last could not be used: its nearest admissible one is used, or it was ignored.
 
     Examples
     --------
@@ -167,9 +167,9 @@ class Compensator(Copied):
     def model(self) -> Model:
         """Model whose inverse is used. It can be set; the voltage then changes without a jump.
 
-        A new model takes effect when the reference has moved by 1/64 of its last stroke since the last change
-        of the model, or has moved for as long as that stroke took without going further: then small movements
-        are the strokes. Movements of less than 1e-4 of the range do not count. Until then the old model is
+        A new model takes effect when the reference has moved by 1/64 of its last swing since the last change
+        of the model, or has moved for as long as that swing took without going further: then small movements
+        are the swings. Movements of less than 1e-4 of the range do not count. Until then the old model is
         used, and the last one that was set waits. When models are set often, the voltage stays in a corridor
         around linear feed-forward, whose gain is at least half the first model's
         (`piezoest.compensators.corridor`).

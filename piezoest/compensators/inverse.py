@@ -34,9 +34,9 @@ class InverseCompensator(Compensator):
 
     Notes
     -----
-    The state follows the limited voltage, so there is no wind-up at the limits. It starts at 0 V and w_h =
-    0, the equilibrium of the paper. The inverse of a `PrandtlIshlinskii` is exact in each sample; `method`
-    does not apply to it.
+    The state follows the limited voltage, so there is no wind-up at the limits. It starts at 0 V, or the
+    limit nearest to it, and w_h = 0, the equilibrium of the paper. The inverse of a `PrandtlIshlinskii` is
+    exact in each sample; `method` does not apply to it.
 
     Sources: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012); Krejci and
     Kuhnen, IEE Proc. Control Theory Appl. 148 (2001) 185-192.

@@ -52,7 +52,8 @@ class LeadFilter(AroundCompensator):
         [Hz].
     delay : float
         Delay from the voltage to the force on the stage [s], such as that of an amplifier's filter. Half a
-        sample of hold is added automatically; the delay of the sensor is not part of it.
+        sample is subtracted automatically, because a reading is taken at the end of its sample. The delay of
+        the sensor is not part of it.
     smoothing : float, optional
         Time constant of the differences [s]; default 1/omega of the mechanics. Higher frequencies are
         amplified by 1 + c1/smoothing + c2/smoothing², which is about two by default.

@@ -63,7 +63,7 @@ class HysteresisEKF(CompiledEstimator):
     Impossible readings are left out as by `policies.OutlierRejection`, but only where the filter too is
     surprised, by more than ten standard deviations, or where the voltage has travelled a tenth of a swing on
     a constant reading. A level that stays for 2 ms is accepted; the offset, or else w_h, follows it.
-    A projected a is at most 40 over a swing of the voltage.
+    With `project`, a is at most 40 divided by the swing of the voltage, or the initial a if that is larger.
 
     The update has Joseph's form. Process noise is given per second, so it need not be changed with the
     sample rate. `theta` is (alpha, beta, gamma) from (4), and `P` its covariance to first order. `s` and

@@ -66,8 +66,8 @@ class OutputErrorRLS(Freezable):
     slow error is not counted once per sample. The model's offset is the centre of the loop plus this
     disturbance. At rest nothing changes.
 
-    `theta` is (alpha, beta, gamma, offset), and `P` its covariance to first order. A decay outside the
-    bank is replaced by the nearest end of the bank.
+    `theta` is (alpha, beta, gamma, offset), and `P` its covariance to first order. A decay may be at most
+    one step beyond the end of the bank.
 
     Sources: L. Ljung, System Identification, 2nd ed. (1999), sec. 10.3, 11.2 and 11.4 (law); Eielsen,
     Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), (2)-(4) (model).

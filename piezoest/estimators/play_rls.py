@@ -24,7 +24,7 @@ MOST_THRESHOLDS, MOST_BENDS, MOST_PARAMETERS = 200, 50, 1000
 class PrandtlIshlinskiiRLS(Freezable):
     """Recursive least squares of a Prandtl-Ishlinskii model with creep, asymmetry and offset.
 
-    x = K u + sum_i rho_i play_i(u) + sum_j c_j creep_j + level is linear in its parameters, with
+    x = K u + sum_i p_i play_i(u) + sum_j c_j creep_j + level is linear in its parameters, with
     regressors from the voltage alone: no derivative of x is taken, minor loops are part of
     the model, and one set of parameters serves all amplitudes.
 
@@ -67,9 +67,10 @@ class PrandtlIshlinskiiRLS(Freezable):
     on time: samples are averaged until the voltage has travelled 1/32 of half the range; then one update
     is made. The variance of each parameter grows with the travel of its own regressor, at most to its
     initial value. So a weight whose play does not move is not forgotten. An additional parameter, the level,
-    may change fast and absorbs slow disturbances. At rest only the level changes. `theta` holds slopes and
-    creep gains. In `model` negative ones are moved to zero, along the shortest way in the metric of P, and
-    the offset is the level averaged over a period.
+    may change fast and absorbs slow disturbances. At rest only the level and the creep gains change. `theta`
+    holds slopes and creep gains. `model` has the nearest values, in the metric of P, with weights and creep
+    gains of at least zero and a gain of at least 5 % of the initial one. Its offset is the level averaged
+    over a period.
 
     An update costs about 3 N² multiplications for N = (1 + n)(1 + k) + m + 1 parameters (m creep terms), a
     sample about 3 N.

@@ -48,7 +48,7 @@ class HysteresisRLS(Freezable):
     noise : float
         Standard deviation of the displacement's noise [µm]; it weighs the initial model against the data.
     cutoff : float
-        Cut-off frequency of W_p [Hz], at least 1e-9 of the sample rate.
+        Cut-off frequency of W_p [Hz], at least 1e-9 of the sample rate; more than half of it counts as half.
     high_pass : float, optional
         Cut-off frequency of a first-order high-pass filter on both sides [Hz], for a biased sensor (last
         remark of App. A); below the reference's lowest frequency. It removes constants only. A bias enters as

@@ -49,10 +49,11 @@ def fit(
     """Fit one kind of model to a record, by the error of the simulated displacement.
 
     All in which a model is linear (slopes of plays, their bends, gain, offset, drift, jumps) is one convex
-    program, solved by CasADi and checked by SciPy. Smoothness of neighbouring slopes is chosen by five
-    blocks of which each is predicted from the others. Creep gains, alpha, the delay and the stage's state
-    before the record are found outside it. Spikes, dropouts and clipped readings are left
-    out, and so is a start that has not settled; jumps of the displacement are fitted beside the model.
+    program, solved by CasADi and checked by SciPy. The record is cut into five blocks; smoothness of
+    neighbouring slopes is that with which each but the first is predicted best from the others. Creep gains,
+    alpha, the delay and the stage's state before the record are found outside it. Spikes, dropouts and
+    clipped readings are left out, and so is a start that has not settled; jumps of the displacement are
+    fitted beside the model.
 
     Parameters
     ----------
@@ -69,8 +70,8 @@ def fit(
     flaws : Flaws, optional
         Spikes, dropouts, clipped readings and jumps; by default they are looked for.
     settle : float, optional
-        Time to leave out at the start [s]; by default as long as it is off by more than four robust standard
-        deviations, at most a tenth.
+        Time to leave out at the start [s]. Default: twice the time for which the error exceeds four robust
+        standard deviations, at most a tenth of the record.
 
     Raises
     ------

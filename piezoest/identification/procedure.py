@@ -73,8 +73,8 @@ def identify(
         Only swings of several sizes or frequencies, or steps, show the difference between a delay and a wider
         loop: see ``delay_known`` of the result.
     settle : float, optional
-        Time to leave out at the start [s]. Default: while the error exceeds four robust standard deviations,
-        at most a tenth of the fitted part.
+        Time to leave out at the start [s]. Default: twice the time for which the error exceeds four robust
+        standard deviations, at most a tenth of the fitted part.
     validate : sequence
         Other logs of the stage, each a record, a file or a table, which the model predicts. They are checked
         as `data` is.

@@ -75,7 +75,7 @@ class Identification:
     delay_known : bool
         Whether the delay was given, or the log can tell it from the width of the loop.
     creep_known : bool
-        Whether the log can tell creep from it.
+        Whether the log can tell creep from a wider loop.
     trained : int
         Number of samples in the fitted part, which comes first.
     record : Record
@@ -211,10 +211,10 @@ class Identification:
         return self.record.notes
 
     def predict(self, u: FloatArray | None = None) -> Prediction:
-        """Displacement that the model expects, and between what a reading will lie, 95 times in 100.
+        """Displacement that the model expects, and bounds between which 95 of 100 readings are expected.
 
-        Kinds that predict about as well may be right: the interval is wider by how far they differ. Of others
-        it is wider where they differ by more than in the fitted part.
+        Kinds that predict about as well may be right: the interval is wider by how far they differ. Kinds
+        that predict worse widen it only where they differ by more than anywhere in the fitted part.
 
         Parameters
         ----------

@@ -134,7 +134,7 @@ class FreeRunning(Model):
     def lifted(self, start: Self, least: float) -> Self:
         """The model, its slope and its decay lifted to a part of the start's.
 
-        A smaller slope commands a larger voltage: what a sensor that reads zero teaches must not.
+        A smaller slope means a larger voltage. A dead sensor that reads zero must not cause one.
 
         Parameters
         ----------

@@ -137,8 +137,8 @@ class LearntOn(AsFields):
         Returns
         -------
         tuple of str
-            A part of a sentence for each range that is left by more than 5 %, for a rate above 1.5 times the
-            one here: with both figures, and without a full stop.
+            For each range that is left by more than 5 %, and for a rate above 1.5 times the rate here, a part
+            of a sentence with both figures, without a full stop.
         """
         said = [
             f"the {name} goes from {ends(now, unit)}, the model was learnt from {ends(known, unit)}"

@@ -41,7 +41,7 @@ class PrandtlIshlinskii(Model):
     creep : Creep, optional
         First-order terms driven by w; `simulate` and `invert` then need the sample rate.
     bends : array_like, shape (k,), optional
-        Voltages at which slopes change [V], rising.
+        Values of the voltage, or of a play's output, at which its slope changes [V], rising.
     bend_weights : array_like, shape (k, 1 + n), optional
         Change of slope above each bend [µm/V], of the gain and of each weight.
     sample_rate : float, optional
@@ -214,7 +214,7 @@ class PrandtlIshlinskii(Model):
         Raises
         ------
         ValueError
-            If u is not a finite 1-D array, no input can leave `initial_state` behind, or the
+            If u is not a finite 1-D array, no voltage can lead to `initial_state`, or the
             sample rate is missing.
         """
         x = array_1d("u", u).copy()
