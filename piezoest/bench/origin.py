@@ -23,8 +23,8 @@ from piezoest._files import write_text
 DISTRIBUTIONS = ("piezoest", "numpy", "scipy", "numba", "casadi", "filterpy")
 PACKAGE = Path(__file__).resolve().parents[1]
 DIGITS = 16  # of a fingerprint
-# Tokens before the first one of a statement: a string that comes then is a docstring.
-BEGINS = (tokenize.ENCODING, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
+# Tokens before a statement: a string that comes then is a docstring.
+ENDS = (tokenize.ENCODING, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
 
 
 def cpu_name() -> str:
@@ -50,14 +50,19 @@ def code_of_parts(root: Path = PACKAGE) -> dict[str, str]:
 
 def _tokens(path: Path) -> bytes:
     """A module without comments, empty lines and docstrings."""
-    found, begins = [], True
+    found, begins, docstring = [], True, False
     with path.open("rb") as file:
         for token in tokenize.tokenize(file.readline):
-            if token.type in BEGINS:
-                begins = True
-            elif token.type not in (tokenize.COMMENT, tokenize.NL):
-                if not (begins and token.type == tokenize.STRING):
-                    found.append(token.string)
+            if token.type in (tokenize.COMMENT, tokenize.NL):
+                continue
+            if token.type in ENDS:
+                # Where lines and blocks end counts; the end of a docstring does not.
+                found += [] if docstring else [tokenize.tok_name[token.type]]
+                begins, docstring = True, False
+            elif begins and token.type == tokenize.STRING:
+                docstring = True
+            else:
+                found.append(token.string)
                 begins = False
     return "\0".join(found).encode()
 
