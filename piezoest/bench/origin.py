@@ -1,5 +1,6 @@
 """What every file of results says of the machine and the code, and where such a file goes."""
 
+import ast
 import functools
 import hashlib
 import importlib
@@ -12,7 +13,6 @@ import platform
 import re
 import sys
 import time
-import tokenize
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -23,8 +23,6 @@ from piezoest._files import write_text
 DISTRIBUTIONS = ("piezoest", "numpy", "scipy", "numba", "casadi", "filterpy")
 PACKAGE = Path(__file__).resolve().parents[1]
 DIGITS = 16  # of a fingerprint
-# Tokens before a statement: a string that comes then is a docstring.
-ENDS = (tokenize.ENCODING, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
 
 
 def cpu_name() -> str:
@@ -34,43 +32,53 @@ def cpu_name() -> str:
     return found[1].strip() if found else platform.processor() or platform.machine()
 
 
+def _sources(root: Path) -> list[Path]:
+    """Files of the package's own source."""
+    return sorted(path for path in root.rglob("*") if path.suffix in (".py", ".json", ".csv"))
+
+
 @functools.cache
 def code_of_parts(root: Path = PACKAGE) -> dict[str, str]:
     """What this package's own source is, by folder: digits that change with all but comments and docstrings.
 
-    `root`: where the package is; another version of it may be elsewhere.
+    `root`: where the package is; another version of it may be elsewhere. It takes a second.
     """
     found: dict[str, Any] = {}
-    for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".json", ".csv")):
+    for path in _sources(root):
         part = found.setdefault(path.parent.relative_to(root).as_posix(), hashlib.sha256())
         part.update(path.name.encode())
-        part.update(_tokens(path) if path.suffix == ".py" else path.read_bytes())
+        content = path.read_bytes()
+        part.update(repr(_shape(ast.parse(content))).encode() if path.suffix == ".py" else content)
     return {name: part.hexdigest()[:DIGITS] for name, part in found.items()}
 
 
-def _tokens(path: Path) -> bytes:
-    """A module without comments, empty lines and docstrings."""
-    found, begins, docstring = [], True, False
-    with path.open("rb") as file:
-        for token in tokenize.tokenize(file.readline):
-            if token.type in (tokenize.COMMENT, tokenize.NL):
-                continue
-            if token.type in ENDS:
-                # Where lines and blocks end counts; the end of a docstring does not.
-                found += [] if docstring else [tokenize.tok_name[token.type]]
-                begins, docstring = True, False
-            elif begins and token.type == tokenize.STRING:
-                docstring = True
-            else:
-                found.append(token.string)
-                begins = False
-    return "\0".join(found).encode()
+def _shape(node: Any) -> Any:
+    """A syntax tree as lists, without docstrings and what only some versions of Python fill in."""
+    match node:
+        case ast.AST():
+            fields = [(name, value) for name, value in ast.iter_fields(node) if value not in (None, [])]
+            return [type(node).__name__, *((name, _shape(value)) for name, value in fields)]
+        case list():
+            return [_shape(each) for each in node if not _is_text(each)]
+    return repr(node)
+
+
+def _is_text(node: Any) -> bool:
+    """Whether a statement is a string alone, as a docstring is."""
+    match node:
+        case ast.Expr(value=ast.Constant(value=str())):
+            return True
+    return False
 
 
 @functools.cache
 def fingerprint() -> str:
-    """Hexadecimal digits that change with this package's own code."""
-    return hashlib.sha256(repr(code_of_parts()).encode()).hexdigest()[:DIGITS]
+    """Hexadecimal digits that change with every file of this package's own source."""
+    found = hashlib.sha256()
+    for path in _sources(PACKAGE):
+        found.update(path.relative_to(PACKAGE).as_posix().encode())
+        found.update(path.read_bytes())
+    return found.hexdigest()[:DIGITS]
 
 
 def code_of(text: str) -> str:

@@ -137,7 +137,7 @@ def test_an_estimators_own_file_is_part_of_its_code(own: str) -> None:
 
 CODE = """def f(x):
     if x:
-        x()
+        "c".join(x)
         return "a"
 """
 
@@ -148,6 +148,7 @@ CODE = """def f(x):
         ("    if x:", '    """What."""\n\n    if x:  # why', True),
         ('"a"', '"b"', False),
         ("        return", "    return", False),
+        ('"c"', '"d"', False),
     ],
 )
 def test_comments_and_docstrings_are_no_other_code(there: str, now: str, same: bool, tmp_path: Path) -> None:
