@@ -27,6 +27,7 @@ from numba.core.registry import cpu_target
 from numba.extending import register_jitable
 
 from piezoest import layout as named
+from piezoest import linking
 from piezoest._checks import FloatArray
 from piezoest.compiled_records import like as like
 from piezoest.compiled_records import local as local
@@ -126,7 +127,8 @@ class Compiled:
             return functools.partial(self._as_python, layouts)
         kinds = [record_type(next(records)) if kind is None else kind for kind in self._arguments]
         try:
-            return self.dispatcher.compile(tuple(kinds))
+            with linking.whole():
+                return self.dispatcher.compile(tuple(kinds))
         except TypingError as error:
             error.add_note(f"{self.__name__} is not compiled: {_cause(str(error))}")
             raise

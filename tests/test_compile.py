@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import TypingError
+from numba import TypingError, njit
 from numba.core.errors import LoweringError
 from numba.extending import register_jitable
 
@@ -137,3 +137,27 @@ def test_no_two_layouts_share_machine_code() -> None:
         assert record_type(one) != record_type(other)
         nested = (record(law=one, tail=NUMBER), record(law=other, tail=NUMBER))
         assert record_type(nested[0]) != record_type(nested[1])
+
+
+@register_jitable
+def third(x: float) -> float:
+    return x / 3.0
+
+
+@register_jitable
+def plus_a_third(x: float) -> float:
+    return x + third(x)
+
+
+@compiled
+def four_thirds(x: float) -> float:
+    return plus_a_third(x)
+
+
+@njit(_nrt=False, error_model="numpy", nogil=True)
+def elsewhere(x: float) -> float:
+    return plus_a_third(x)
+
+
+def test_a_part_of_a_loop_can_be_part_of_a_function_that_numba_compiles_alone() -> None:
+    assert four_thirds(1.5) == plus_a_third(1.5) == elsewhere(1.5)
