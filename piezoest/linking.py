@@ -25,47 +25,56 @@ _lock: Any = global_compiler_lock
 _Library: Any = JITCodeLibrary
 
 
-class _Part(_Library):  # type: ignore[misc]
-    """Code of a function that only other compiled ones call: neither optimised nor machine code."""
+class _Whole(_Library):  # type: ignore[misc]
+    """The code of a function with all that it calls, optimised as one."""
 
-    def _get_module_for_linking(self: Any) -> Any:
-        """Return the code with all that it calls, for a caller that is compiled elsewhere."""
-        if self._shared_module is None:
-            _take_in(self)
-            self._shared_module = self._final_module
-        return self._shared_module
+    def is_part(self, function: Any) -> bool:
+        """Whether it is new, and Python cannot call its function."""
+        if self._finalized:
+            return False
+        return function.llvm_cpython_wrapper_name not in {each.name for each in self._final_module.functions}
 
-
-def _become_part(library: Any) -> None:
-    library.__class__ = _Part
-    library._finalized = True
-    # Several callers may take it in: one copy is kept. Names that are no longer used go.
-    for function in library._final_module.functions:
-        if not function.is_declaration and function.linkage == Linkage.external:
-            function.linkage = "linkonce_odr"
-
-
-def _below(library: Any) -> list[Any]:
-    """Libraries that a library calls, and those that their parts call, each once."""
-    found: dict[Any, None] = {}
-    new = [library]
-    while new:
-        for called in new.pop()._linking_libraries:
-            if called not in found:
-                found[called] = None
+    def below(self, known: dict[Any, None]) -> dict[Any, None]:
+        """Return what this function calls, and what that calls, each before those that call it."""
+        for called in self._linking_libraries:
+            if called not in known:
                 if isinstance(called, _Part):
-                    new.append(called)
-    return list(found)
+                    called.below(known)
+                known[called] = None
+        return known
+
+    def take_in(self) -> None:
+        """Take in what is below: callers first, for LLVM drops what nobody has called yet."""
+        for called in reversed(self.below({})):
+            if hasattr(self, "_reload_init"):  # not before Numba 0.62
+                self._reload_init.update(called._reload_init)
+            part = isinstance(called, _Part)
+            module = called._final_module if part else called._get_module_for_linking()
+            self._final_module.link_in(module, preserve=True)
+        self._linking_libraries.clear()
+
+    def optimise(self) -> None:
+        """Optimise once more than Numba does: as fast then as if the parts had been optimised before."""
+        if self._linking_libraries:
+            self.take_in()
+            self._optimize_final_module()
 
 
-def _take_in(library: Any) -> None:
-    """Put all that a library calls into it."""
-    for called in _below(library):
-        if hasattr(library, "_reload_init"):  # not before Numba 0.62
-            library._reload_init.update(called._reload_init)
-        module = called._final_module if isinstance(called, _Part) else called._get_module_for_linking()
-        library._final_module.link_in(module, preserve=True)
-    library._linking_libraries.clear()
+class _Part(_Whole):
+    """The code of a function that only other compiled ones call: neither optimised nor machine code."""
+
+    def leave(self) -> None:
+        """Leave it as it is. Several callers may take it in: one copy is kept."""
+        self._finalized = True
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.external:
+                function.linkage = "linkonce_odr"
+
+    def _get_module_for_linking(self) -> Any:
+        """Return the code with all that it calls, for a caller that is compiled elsewhere."""
+        if self._linking_libraries:
+            self.take_in()
+        return self._final_module
 
 
 @contextlib.contextmanager
@@ -74,20 +83,15 @@ def whole() -> Iterator[None]:
     usual = _Context.get_executable, _Context.create_cfunc_wrapper
 
     def get_executable(context: Any, library: Any, function: Any, environment: Any) -> Any:
-        names = {each.name for each in library._final_module.functions}
-        if library._finalized:
-            return usual[0](context, library, function, environment)
-        if function.llvm_cpython_wrapper_name in names:
-            if library._linking_libraries:
-                _take_in(library)
-                # Once more than usual: as fast then as if the functions had been optimised before.
-                library._optimize_final_module()
-            return usual[0](context, library, function, environment)
-        _become_part(library)
-        # A name for callers to find it by; Python does not call it.
-        return _dynfunc.make_function(
-            function.lookup_module(), function.qualname, "", 0, environment, (library,)
-        )
+        library.__class__ = _Whole
+        if library.is_part(function):
+            library.__class__ = _Part
+            library.leave()
+            # A name for callers to find it by; Python does not call it.
+            name = function.qualname
+            return _dynfunc.make_function(function.lookup_module(), name, "", 0, environment, (library,))
+        library.optimise()
+        return usual[0](context, library, function, environment)
 
     # No other thread compiles before the lock is free again.
     with _lock:

@@ -50,48 +50,26 @@ def write_sheets(path: Path, **tables: Sequence[Sequence[Any]]) -> Path:
 def write_tdms(path: Path, **changes: object) -> Path:
     """A file of two segments; `changes` are properties of the second channel."""
     nptdms = pytest.importorskip("nptdms")
-    waveform = {"wf_increment": 1.0 / RATE}
+    rate = {"wf_increment": 1.0 / RATE}
     with nptdms.TdmsWriter(str(path)) as writer:
         for part in (slice(0, 20), slice(20, N)):
-            u = nptdms.ChannelObject("run", "drive", 1e3 * VOLTAGE[part], {**waveform, "unit_string": "mV"})
-            x = nptdms.ChannelObject(
-                "run", "gauge", DISPLACEMENT[part], {**waveform, "unit_string": "um", **changes}
-            )
+            u = nptdms.ChannelObject("run", "drive", 1e3 * VOLTAGE[part], {**rate, "unit_string": "mV"})
+            gauge = {**rate, "unit_string": "um", **changes}
+            x = nptdms.ChannelObject("run", "gauge", DISPLACEMENT[part], gauge)
             writer.write_segment([u, x, nptdms.ChannelObject("notes", "words", ["a", "b"])])
     return path
 
 
-FILE_HEADER = """LabVIEW Measurement\t
-Writer_Version\t2
-Reader_Version\t2
-Separator\t{name}
-Decimal_Separator\t{decimal}
-Multi_Headings\tYes
-X_Columns\t{x_columns}
-Time_Pref\tRelative
-Operator\tAda
-Date\t2026/11/22
-Time\t10:00:00,0
-***Start_Special***
-Channels\t99
-***End_Special***
-***End_of_Header***\t
-"""
-SEGMENT = """\t
-Channels\t2\t\t
-Samples\t{samples}\t{samples}\t
-Date\t2026/11/22\t2026/11/22\t
-Time\t10:00:{second:012.9f}\t10:00:{second:012.9f}\t
-Y_Unit_Label\tVolts\tum\t
-X_Dimension\tTime\tTime\t
-X0\t{x_0}\t{x_0}\t
-Delta_X\t0.01\t0.01\t
-***End_of_Header***\t\t\t
-{names}
-"""
-
-
-COLUMNS = "X_Value\tDrive\tPosition\tComment"
+FILE_HEAD = (
+    "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\t{name}\nDecimal_Separator\t{decimal}\n"
+    "Multi_Headings\tYes\nX_Columns\t{x_columns}\nTime_Pref\tRelative\nDate\t2026/11/22\nTime\t10:00:00,0\n"
+    "***Start_Special***\nChannels\t99\n***End_Special***\n***End_of_Header***\t\n"
+)
+SEGMENT_HEAD = (
+    "\t\nChannels\t2\t\t\nSamples\t{samples}\t{samples}\t\nDate\t2026/11/22\t2026/11/22\t\n"
+    "Time\t10:00:{second:012.9f}\t10:00:{second:012.9f}\t\nY_Unit_Label\tVolts\tum\t\n"
+    "X_Dimension\tTime\tTime\t\nX0\t{x_0}\t{x_0}\t\nDelta_X\t0.01\t0.01\t\n***End_of_Header***\t\t\t\n"
+)
 
 
 def write_lvm(
@@ -103,16 +81,15 @@ def write_lvm(
     x_columns: str = "One",
 ) -> Path:
     """Write a .lvm file of segments: rows, X of the first row, seconds of the clock."""
-    names = "X_Value\tDrive\tX_Value\tPosition\tComment" if x_columns == "Multi" else COLUMNS
     word = {"\t": "Tab", ";": "Semicolon"}[separator]
-    content = FILE_HEADER.format(name=word, decimal=decimal, x_columns=x_columns)
+    content = FILE_HEAD.format(name=word, decimal=decimal, x_columns=x_columns)
+    again = "\tX_Value" if x_columns == "Multi" else ""
     for part, x_0, second in segments:
-        count = len(range(N)[part])
-        content += SEGMENT.format(samples=count, second=second, x_0=x_0, names=names)
+        content += SEGMENT_HEAD.format(samples=len(range(N)[part]), second=second, x_0=x_0)
+        content += f"X_Value\tDrive{again}\tPosition\tComment\n"
         for k, (u, x) in enumerate(zip(VOLTAGE[part], DISPLACEMENT[part], strict=True)):
-            t = f"{x_0 + k / RATE:.6f}"
-            row = {"No": ["", f"{u:.6f}", f"{x:.6f}"], "Multi": [t, f"{u:.6f}", t, f"{x:.6f}"]}
-            cells = row.get(x_columns, [t, f"{u:.6f}", f"{x:.6f}"])
+            t = "" if x_columns == "No" else f"{x_0 + k / RATE:.6f}"
+            cells = [t, f"{u:.6f}", t, f"{x:.6f}"] if again else [t, f"{u:.6f}", f"{x:.6f}"]
             content += "\t".join(cells) + ("\tbegins" if k == 0 else "") + "\n"
     path.write_text(content.replace(".", decimal).replace("\t", separator), encoding="utf-8")
     return path

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import warnings
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -29,22 +28,16 @@ def tripled(x: float) -> float:
     return 3.0 * x
 
 
-def compiled_functions() -> dict[str, Compiled]:
-    found: dict[str, Compiled] = {}
-    for each in pkgutil.walk_packages([str(PACKAGE)], "piezoest."):
-        for name, value in vars(importlib.import_module(each.name)).items():
-            assert not isinstance(value, Dispatcher), f"{each.name}.{name}: use piezoest.compile.compiled"
-            if isinstance(value, Compiled):
-                found[f"{value.__module__}.{value.__name__}"] = value
-    return found
-
-
-def test_what_is_compiled_stands_at_module_level() -> None:
-    found = compiled_functions()
-    assert len(found) > 20
-    for name, function in found.items():
-        assert "<locals>" not in name
-        assert isinstance(function.dispatcher._cache, machine_code.MachineCode)
+def test_sources_are_all_that_compiled_functions_are_made_of() -> None:
+    names = [each.name for each in pkgutil.walk_packages([str(PACKAGE)], "piezoest.")]
+    values = [value for name in names for value in vars(importlib.import_module(name)).values()]
+    assert not any(isinstance(value, Dispatcher) for value in values), "use piezoest.compile.compiled"
+    functions: list[Any] = [value.function for value in values if isinstance(value, Compiled)]
+    functions += filter(compile.is_marked, {value for value in values if inspect.isfunction(value)})
+    # Chains of policies' hooks have no file.
+    files = {each.__code__.co_filename for each in functions if Path(inspect.getfile(each)).is_file()}
+    assert len(files) > 50
+    assert files <= {str(path) for path in machine_code.sources()}
 
     def inner(x: float) -> float:
         return x
@@ -53,41 +46,20 @@ def test_what_is_compiled_stands_at_module_level() -> None:
         compiled(inner)
 
 
-def functions_of(function: Any, found: set[Any]) -> set[Any]:
-    """Functions of the package that a compiled one can call, by the names in its code."""
-    function = inspect.unwrap(getattr(function, "function", function))
-    if function in found:
-        return found
-    found.add(function)
-    known, codes = function.__globals__, [function.__code__]
-    while codes:
-        code = codes.pop()
-        codes += [constant for constant in code.co_consts if inspect.iscode(constant)]
-        values = [known.get(name) for name in code.co_names]
-        owners = [value for value in values if isinstance(value, ModuleType)]
-        values += [vars(owner).get(name) for owner in owners for name in code.co_names]
-        for value in values:
-            inner = value.function if isinstance(value, Compiled) else value
-            # Also through chains of policies' hooks, which have no file.
-            if inspect.isfunction(inner) and (
-                str(inner.__module__).startswith("piezoest") or inner.__code__.co_filename.startswith("<")
-            ):
-                functions_of(inner, found)
-    return found
+LOOP = """
+import piezoest as pz
+
+print(pz.PrandtlIshlinskii(0.1, [1.0], [0.02]).simulate([0.0, 1.0, -2.0]).tolist())
+"""
 
 
-def test_sources_are_all_that_compiled_functions_are_made_of() -> None:
-    reached: set[Any] = set()
-    for function in compiled_functions().values():
-        functions_of(function, reached)
-    assert len(reached) > 100
-    assert "piezoest.policies.dead_zone" in {function.__module__ for function in reached}  # a hook
-    files = {function.__code__.co_filename for function in reached}
-    known = {str(path) for path in machine_code.sources()}
-    assert {file for file in files if not file.startswith("<")} <= known
-    # ... and no more: files without any compiled function, but for constants.
-    others = ("bench/run.py", "cli/__init__.py", "estimators/rls.py", "estimators/base.py", "tracking.py")
-    assert not known & {str(PACKAGE / other) for other in others}
+def test_a_loop_that_another_process_has_compiled_does_the_same(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", LOOP]
+    runs = [subprocess.run(command, env=environment, capture_output=True, text=True) for _ in range(2)]
+    assert list(tmp_path.rglob("*.nbc"))
+    assert [run.returncode for run in runs] == [0, 0]
+    assert runs[0].stdout == runs[1].stdout != ""
 
 
 # Edits of what compiled functions are made of, and of what they are not.
@@ -100,7 +72,7 @@ EDITS = [
 OTHER_EDITS = [
     ("estimators/rls.py", "PAPER_MEMORY = 0.4", "PAPER_MEMORY = 0.5"),
     ("policies/norm_bound.py", "limit: float = 100.0", "limit: float = 90.0"),
-    ("cli/__init__.py", "import", "# edited\nimport"),
+    *((f"{name}.py", "import", "# edited\nimport") for name in ("bench/run", "cli/__init__", "tracking")),
 ]
 
 
@@ -111,24 +83,18 @@ def test_only_an_edit_of_a_source_makes_machine_code_anew(tmp_path: Path, monkey
     monkeypatch.setattr(machine_code, "sources", inspect.unwrap(machine_code.sources))
 
     def digest(*edits: tuple[str, str, str]) -> str:
-        texts = {copy / file: (copy / file).read_text(encoding="utf-8") for file, _, _ in edits}
         for file, old, new in edits:
-            assert old in texts[copy / file]
-            (copy / file).write_text(texts[copy / file].replace(old, new, 1), encoding="utf-8")
+            text = (PACKAGE / file).read_text(encoding="utf-8")
+            assert old in text
+            (copy / file).write_text(text.replace(old, new, 1), encoding="utf-8")
         found = str(inspect.unwrap(machine_code.digest)())
-        for path, text in texts.items():
-            path.write_text(text, encoding="utf-8")
+        for file, _, _ in edits:
+            shutil.copy(PACKAGE / file, copy / file)
         return found
 
     before = digest()
     assert digest(*OTHER_EDITS) == before
     assert len({before, *(digest(edit) for edit in EDITS)}) == 1 + len(EDITS)
-
-
-@pytest.fixture
-def kept_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(machine_code, "folder", lambda: tmp_path)
-    return tmp_path
 
 
 def loaded() -> int:
@@ -138,19 +104,16 @@ def loaded() -> int:
     return sum(made.dispatcher.stats.cache_hits.values())
 
 
-def test_a_damaged_file_is_compiled_anew(kept_in: Path) -> None:
+def test_damaged_files_other_sources_and_options_are_compiled_anew(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr(machine_code, "folder", lambda: tmp_path)
     assert loaded() == 0
-    (file,) = kept_in.iterdir()
+    (file,) = tmp_path.iterdir()
     whole = file.read_bytes()
     for damaged in (b"", whole[:40], whole[:-1], whole[:200] + bytes([whole[200] ^ 1]) + whole[201:]):
         file.write_bytes(damaged)
         assert loaded() == 0
     assert loaded() == 1
-    assert list(kept_in.iterdir()) == [file]
-
-
-def test_other_sources_options_or_versions_are_compiled_anew(kept_in: Path, monkeypatch: Any) -> None:
-    assert (loaded(), loaded()) == (0, 1)
+    assert list(tmp_path.iterdir()) == [file]
     for name, value in (("digest", lambda: "another"), ("_own_source", lambda path: "another")):
         with monkeypatch.context() as changed:
             changed.setattr(machine_code, name, value)
@@ -193,33 +156,29 @@ def test_an_edit_of_what_a_model_of_ones_own_imports_counts(tmp_path: Path) -> N
         assert done.stdout.strip() == factor
 
 
-LOOPS = (kernel.step, kernel.learn, kernel.run, kernel.learn_all)  # what a live loop will call
-
-
 def forget(monkeypatch: pytest.MonkeyPatch, *loops: Any) -> None:
     for loop in loops:
         monkeypatch.setattr(loop, "_entries", {})
 
 
 def test_the_class_stands_for_a_controller_of_any_rate_and_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    forget(monkeypatch, *LOOPS)
+    loops = (kernel.step, kernel.learn, kernel.run, kernel.learn_all)  # what a live loop will call
+    forget(monkeypatch, *loops)
     assert piezoest.warmup(piezoest.AdaptiveFeedforward) > 0.0
-    loaded = [list(loop._entries) for loop in LOOPS]
+    loaded = [list(loop._entries) for loop in loops]
     controller = piezoest.AdaptiveFeedforward(1234.0, limits=piezoest.VoltageLimits(-3.0, 7.0, 100.0, 1234.0))
-    assert loaded == [[controller.layouts]] * len(LOOPS)
+    assert loaded == [[controller.layouts]] * len(loops)
 
 
 def test_what_is_warmed_up_is_left_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    controller = piezoest.AdaptiveFeedforward(
-        1000.0, limits=piezoest.VoltageLimits(0.0, 100.0), estimators=()
-    )
-    before = controller.to_dict()
-    piezoest.warmup(controller)
-    assert controller.to_dict() == before
-    forget(monkeypatch, inverse_kernel.step, inverse_kernel.run)
+    limits = piezoest.VoltageLimits(0.0, 100.0)
+    controller = piezoest.AdaptiveFeedforward(1000.0, limits=limits, estimators=())
     model = piezoest.PrandtlIshlinskii(0.1, [1.0, 2.0, 3.0], [0.02, 0.01, 0.01])
     compensator = piezoest.InverseCompensator(model, sample_rate=1000.0)
-    piezoest.warmup(compensator)
+    before = controller.to_dict()
+    forget(monkeypatch, inverse_kernel.step, inverse_kernel.run)
+    piezoest.warmup(controller, compensator)
+    assert controller.to_dict() == before
     assert compensator.status.samples == 0
-    assert compensator.layouts in inverse_kernel.step._entries
-    assert compensator.layouts in inverse_kernel.run._entries
+    for loop in (inverse_kernel.step, inverse_kernel.run):
+        assert compensator.layouts in loop._entries

@@ -1,8 +1,7 @@
 """The worked examples of CONTRIBUTING.md: each section "Adding a …" is carried out in a copy of the package.
 
 The first line of a fenced block says where it goes. The last block of a section is a test file; it is run as
-plain Python, for to compile the copy would take a minute. So are the
-tests that find by themselves what was added.
+plain Python, for to compile the copy would take a minute.
 """
 
 import os
@@ -15,41 +14,31 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PLACE = re.compile(r"# (new file|added to) (\S+?)(?:, below (.+))?")
-
-
-def examples(text: str) -> dict[str, list[str]]:
-    """Fenced blocks of Python of each section whose heading begins with "Adding"."""
-    sections = re.split(r"^## ", text, flags=re.MULTILINE)[1:]
-    titled = {title: body for title, _, body in (section.partition("\n") for section in sections)}
-    fenced = re.compile(r"^```python\n(.*?)^```$", flags=re.MULTILINE | re.DOTALL)
-    return {title: fenced.findall(body) for title, body in titled.items() if title.startswith("Adding ")}
-
-
-def apply(block: str, folder: Path) -> Path:
-    """Write a block to where its first line says; returns the file."""
-    comment, _, code = block.partition("\n")
-    place = PLACE.fullmatch(comment)
-    assert place is not None, f"a block must begin with its place, got {comment!r}"
-    how, name, line = place.groups()
-    path = folder / name
-    assert path.exists() == (how == "added to"), f"{comment}: {name} is there, or is not"
-    old = path.read_text() if path.exists() else ""
-    if line is None:
-        new = f"{old}\n\n{code}" if old else code
-    else:
-        assert old.count(f"{line}\n") == 1, f"{comment}: the line must stand there once"
-        new = old.replace(f"{line}\n", f"{line}\n{code}")
-    path.write_text(new)
-    return path
-
-
+PLACE = re.compile(r"^# (new file|added to) (\S+?)(?:, below (.+))?$")
+SECTION = re.compile(r"^## (Adding .*?)\n(.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+TEXT = (ROOT / "CONTRIBUTING.md").read_text()
+EXAMPLES = {title: BLOCK.findall(body) for title, body in SECTION.findall(TEXT)}
 FOUND_BY = {
     "Adding a policy": ("VarianceLimit", "tests/test_package.py", "tests/policies/test_base.py"),
     "Adding a model": ("Backlash", "tests/test_package.py"),
     "Adding an estimator": ("SlopeFilter", "tests/test_package.py", "tests/estimators/test_conformance.py"),
 }  # fmt: skip
-EXAMPLES = examples((ROOT / "CONTRIBUTING.md").read_text())
+
+
+def apply(block: str, folder: Path) -> Path:
+    """Write a block to where its first line says; returns the file."""
+    comment, _, code = block.partition("\n")
+    ((how, name, line),) = PLACE.findall(comment)
+    path = folder / name
+    assert path.exists() == (how == "added to"), comment
+    old = path.read_text() if path.exists() else ""
+    if line:
+        assert old.count(f"{line}\n") == 1, f"{comment}: the line must stand there once"
+        path.write_text(old.replace(f"{line}\n", f"{line}\n{code}"))
+    else:
+        path.write_text(f"{old}\n\n{code}" if old else code)
+    return path
 
 
 def run(folder: Path, *arguments: str) -> None:

@@ -26,16 +26,11 @@ def declare(file: Any, *shape: int) -> None:
     np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
 
 
-def npz_that_expands(path: Path) -> None:
+def npz(path: Path, numbers: int, megabytes: int = 0) -> None:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("x.npy", "w") as inside:
-        declare(inside, 2**26)
-        for _ in range(512):
+        declare(inside, numbers)
+        for _ in range(megabytes):
             inside.write(bytes(1 << 20))
-
-
-def npz_that_lies(path: Path) -> None:
-    with zipfile.ZipFile(path, "w") as archive, archive.open("x.npy", "w") as inside:
-        declare(inside, 2**50)
 
 
 def npy_that_declares_much(path: Path) -> None:
@@ -45,7 +40,7 @@ def npy_that_declares_much(path: Path) -> None:
 
 def mat_that_declares_much(path: Path) -> None:
     # An array of doubles of shape (1, 2**29), as its flags, shape and name say.
-    array = struct.pack("<4I", 6, 8, 6, 0) + struct.pack("<2I2i", 5, 8, 1, 2**29) + b"\1\0\1\0u\0\0\0"
+    array = struct.pack("<8I", 6, 8, 6, 0, 5, 8, 1, 2**29) + b"\1\0\1\0u\0\0\0"
     packed = zlib.compress(struct.pack("<2I", 14, 0xF0000000) + array + bytes(1000))
     head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
     path.write_bytes(head + struct.pack("<2I", 15, len(packed)) + packed)
@@ -53,63 +48,69 @@ def mat_that_declares_much(path: Path) -> None:
 
 def parquet_of_nothing_but_zeros(path: Path) -> None:
     pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
-    zeros = pa.array(np.zeros(2**26))
+    zeros = pa.array(np.zeros(2**22))
     pq.write_table(pa.table(dict.fromkeys(LOG, zeros)), path, compression="zstd")
+
+
+def spreadsheet_without_sheets(path: Path) -> None:
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("[Content_Types].xml", "<Types/>")
+        archive.writestr("xl/workbook.xml", "<workbook/>")
 
 
 @pytest.mark.parametrize(
     ("name", "make", "words"),
     [
         ("log.h5", hdf5_that_declares_much, "declares 5.5e[+]05 MB of numbers"),
-        ("log.npz", npz_that_expands, "declares 537 MB of numbers"),
-        ("log.npz", npz_that_lies, "cannot be read as NumPy"),
+        ("log.npz", lambda path: npz(path, 2**22, 32), "declares 33.6 MB of numbers"),
+        ("log.npz", lambda path: npz(path, 2**50), "cannot be read as NumPy"),
         ("log.npy", npy_that_declares_much, "cannot be read as NumPy"),
         ("log.mat", mat_that_declares_much, "declares 4.29e[+]03 MB of numbers"),
-        ("log.parquet", parquet_of_nothing_but_zeros, "declares 537 MB of numbers"),
+        ("log.parquet", parquet_of_nothing_but_zeros, "declares 33.6 MB of numbers"),
+        ("log.xlsx", spreadsheet_without_sheets, "cannot be read as a spreadsheet"),
     ],
 )
-def test_what_a_file_declares_is_checked(tmp_path: Path, name: str, make: Any, words: str) -> None:
+def test_what_a_file_declares_is_checked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, make: Any, words: str
+) -> None:
+    monkeypatch.setattr("piezoest.records.source.PLENTY", 1 << 24)
     make(tmp_path / name)
     with pytest.raises(ValueError, match=rf"log\.\w+: .*{words}"):
         read_record(tmp_path / name)
 
 
-def external_storage(file: Any, folder: Path) -> None:
-    del file["displacement_um"]
-    file.create_dataset("displacement_um", shape=(N,), dtype="f8", external=[(folder / "raw", 0, 8 * N)])
+def storage(file: Any, source: str) -> None:
+    raw = Path(file.filename).with_name("raw")
+    raw.write_bytes(LOG["displacement_um"].tobytes())
+    file.create_dataset("position_um", shape=(N,), dtype="f8", external=[(raw, 0, 8 * N)])
 
 
-def external_link(file: Any, folder: Path) -> None:
-    del file["displacement_um"]
-    file["displacement_um"] = pytest.importorskip("h5py").ExternalLink("other.h5", "/displacement_um")
+def link(file: Any, source: str) -> None:
+    file["position_um"] = pytest.importorskip("h5py").ExternalLink(source, "/displacement_um")
 
 
-def virtual(file: Any, folder: Path, other: str = "other.h5") -> None:
+def virtual(file: Any, source: str) -> None:
     h5py = pytest.importorskip("h5py")
     layout = h5py.VirtualLayout((N,), "f8")
-    layout[:] = h5py.VirtualSource(other, "displacement_um", shape=(N,))
+    layout[:] = h5py.VirtualSource(source, "displacement_um", shape=(N,))
     file.create_virtual_dataset("position_um", layout)
 
 
-@pytest.mark.parametrize("elsewhere", [external_storage, external_link, virtual])
-def test_other_files_are_not_opened(tmp_path: Path, elsewhere: Callable[[Any, Path], None]) -> None:
+@pytest.mark.parametrize("elsewhere", [storage, link, virtual])
+def test_other_files_are_not_opened(tmp_path: Path, elsewhere: Callable[[Any, str], None]) -> None:
+    h5py = pytest.importorskip("h5py")
     for name in ("other.h5", "log.h5"):
         write_hdf5(tmp_path / name)
-    (tmp_path / "raw").write_bytes(LOG["displacement_um"].tobytes())
-    with pytest.importorskip("h5py").File(tmp_path / "log.h5", "r+") as file:
-        elsewhere(file, tmp_path)
+    with h5py.File(tmp_path / "log.h5", "r+") as file:
+        del file["displacement_um"]
+        elsewhere(file, "other.h5")
     with pytest.raises(ValueError, match=r"log\.h5: \w+ lies in another file"):
         read_record(tmp_path / "log.h5")
-
-
-def test_what_lies_in_the_file_is_read(tmp_path: Path) -> None:
-    h5py = pytest.importorskip("h5py")
+    # What lies in the file is read.
     write_hdf5(tmp_path / "log.h5")
     with h5py.File(tmp_path / "log.h5", "r+") as file:
-        file["above"] = file["/"]
-        file["nowhere"] = h5py.SoftLink("/nothing")
-        file["none"] = h5py.Empty("f8")
-        virtual(file, tmp_path, other=".")
+        file["above"], file["nowhere"], file["none"] = file["/"], h5py.SoftLink("/nothing"), h5py.Empty("f8")
+        virtual(file, ".")
     assert len(read_record(tmp_path / "log.h5", columns={"displacement": "position_um"})) == N
 
 
@@ -136,24 +137,15 @@ def test_text_that_is_no_log(tmp_path: Path, name: str, content: str, words: str
     assert len(str(refusal.value)) < 400 + len(str(path))
 
 
-def test_a_damaged_spreadsheet_is_called_one(tmp_path: Path) -> None:
-    path = tmp_path / "log.xlsx"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("[Content_Types].xml", "<Types/>")
-        archive.writestr("xl/workbook.xml", "<workbook/>")
-    with pytest.raises(ValueError, match=r"log\.xlsx: cannot be read as a spreadsheet"):
-        read_record(path)
-
-
 @pytest.mark.parametrize("rate", [[1e3, 1e3], "fast", np.nan, -5.0])
 def test_a_sample_rate_that_is_none_is_not_taken(tmp_path: Path, rate: Any) -> None:
-    columns = {name: values for name, values in LOG.items() if name != "time_s"}
-    write_hdf5(tmp_path / "log.h5", columns, sample_rate=rate)
+    path, columns = tmp_path / "log.h5", {name: values for name, values in LOG.items() if name != "time_s"}
+    write_hdf5(path, columns, sample_rate=rate)
     with pytest.raises(ValueError, match=r"log\.h5: no column for time found"):
-        read_record(tmp_path / "log.h5")
-    assert read_record(tmp_path / "log.h5", sample_rate=50.0).sample_rate == 50.0
-    write_hdf5(tmp_path / "log.h5", columns, sample_rate=[100.0])
-    assert read_record(tmp_path / "log.h5").sample_rate == 100.0
+        read_record(path)
+    assert read_record(path, sample_rate=50.0).sample_rate == 50.0
+    write_hdf5(path, columns, sample_rate=[100.0])
+    assert read_record(path).sample_rate == 100.0
 
 
 def packed(path: Path) -> None:
@@ -163,6 +155,7 @@ def packed(path: Path) -> None:
 
 
 MAKERS: dict[str, Callable[[Path], Any]] = {
+    **dict.fromkeys(("csv", "npy", "h5", "parquet"), lambda path: write_columns(path, LOG)),
     "csv.gz": packed,
     "lvm": lambda path: write_lvm(path, ((slice(0, 30), 0.0, 0.0), (slice(30, N), 0.3, 0.0))),
     "tdms": write_tdms,
@@ -171,15 +164,12 @@ MAKERS: dict[str, Callable[[Path], Any]] = {
 }
 
 
-@pytest.mark.parametrize("ending", ["csv", "npy", "h5", "parquet", *MAKERS])
+@pytest.mark.parametrize("ending", MAKERS)
 def test_any_damage_ends_in_one_sentence(tmp_path: Path, ending: str) -> None:
     if ending in ("h5", "parquet"):
         pytest.importorskip("h5py" if ending == "h5" else "pyarrow")
     path = tmp_path / f"log.{ending}"
-    if ending in MAKERS:
-        MAKERS[ending](path)
-    else:
-        write_columns(path, LOG)
+    MAKERS[ending](path)
     assert len(read_record(path)) == N
     good, chance = path.read_bytes(), random.Random(0)
     said: list[str] = []

@@ -41,9 +41,13 @@ def content(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def columns(seed: int) -> dict[str, Any]:
-    noise = np.random.default_rng(seed).standard_normal((2, SIZE))
-    return {"time_s": np.arange(SIZE) / 1e3, "voltage_V": noise[0], "displacement_um": noise[1]}
+def noise(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(SIZE)
+
+
+def log(path: Path, seed: int) -> None:
+    values = noise(seed)
+    write_columns(path, {"time_s": np.arange(SIZE) / 1e3, "voltage_V": values, "displacement_um": -values})
 
 
 def page(path: Path, seed: int) -> None:
@@ -54,25 +58,22 @@ def page(path: Path, seed: int) -> None:
 
 def figure(path: Path, seed: int) -> None:
     drawn = Figure()
-    drawn.subplots().plot(columns(seed)["voltage_V"])
+    drawn.subplots().plot(noise(seed))
     save_figure(drawn, path)
 
 
-def rows(path: Path, seed: int, format: str) -> None:
+def rows(path: Path, seed: int) -> None:
     periods = [{"key": "run", "seed": seed, "period": k, "error": 0.1 * k} for k in range(SIZE)]
-    tables.write_table(tables.table_of(periods, table.PERIOD_COLUMNS), path.with_suffix(f".{format}"))
+    tables.write_table(tables.table_of(periods, table.PERIOD_COLUMNS), path)
 
 
 def waveform(path: Path, seed: int) -> None:
-    values = columns(seed)["voltage_V"]
+    values = noise(seed)
     Table(1e3, values, values, (np.column_stack([values, values]),)).write(path.parent)
 
 
 OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
-    **{
-        f"log{ending}": lambda path, seed: write_columns(path, columns(seed))
-        for ending in (".csv", ".parquet", ".h5", ".mat", ".npy")
-    },
+    **dict.fromkeys(("log.csv", "log.parquet", "log.h5", "log.mat", "log.npy"), log),
     "profile.json": lambda path, seed: AmplitudeProfile(
         np.arange(1.0, SIZE), np.full((SIZE - 1, 3), 0.1 * seed)).save(path),
     "page.html": page,
@@ -80,9 +81,8 @@ OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
     "controller.c": lambda path, seed: CCode(
         "controller", f"{seed}" * SIZE, f"{seed}" * SIZE, "double", False).write(path.parent),
     "waveform.csv": waveform,
-    "put.json": lambda path, seed: origin.put(columns(seed)["voltage_V"].tolist(), path),
-    "periods.csv": lambda path, seed: rows(path, seed, "csv"),
-    "periods.parquet": lambda path, seed: rows(path, seed, "parquet"),
+    "put.json": lambda path, seed: origin.put(noise(seed).tolist(), path),
+    **dict.fromkeys(("periods.csv", "periods.parquet"), rows),
 }  # fmt: skip
 
 
@@ -102,16 +102,13 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path, name: str) -> None:
 
 
 KILLED = """
-import os, signal, sys
-import numpy as np
-
+import os, signal, sys, numpy
+from piezoest.records import write_columns
 def half(file, *rest, **options):
     file.write("half a line")
     file.flush()
     os.kill(os.getpid(), signal.SIGKILL)
-
-from piezoest.records import write_columns
-np.savetxt = half
+numpy.savetxt = half
 write_columns(sys.argv[1], {"time_s": [0.0, 1.0], "voltage_V": [2.0, 3.0]})
 """
 

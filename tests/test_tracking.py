@@ -11,31 +11,35 @@ import piezoest as pz
 FS = 50_000.0
 START = pz.ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)
 LINE = pz.LinearGain(0.14)
+UNITY: Any = {"compensator": pz.LinearCompensator(pz.LinearGain(1.0))}
+WAVE = np.sin(np.linspace(0.0, 6.0, 100))
 
 
 def test_plain_arrays_need_a_rate() -> None:
-    wire, compensator = SimpleNamespace(step=lambda u: u), pz.LinearCompensator(pz.LinearGain(1.0))
-    r = np.sin(np.linspace(0.0, 6.0, 100))
+    wire = SimpleNamespace(step=lambda u: u)
     with pytest.raises(ValueError, match="sample_rate is unknown"):
-        pz.track(r, stage=wire, compensator=compensator)
-    record = pz.track(r, stage=wire, compensator=compensator, sample_rate=100.0)
+        pz.track(WAVE, stage=wire, **UNITY)
+    record = pz.track(WAVE, stage=wire, **UNITY, sample_rate=100.0)
     np.testing.assert_allclose(record.error, 0.0, atol=1e-12)
-    assert record.time[1] == 0.01
-    assert record.theta.shape == (100, 0)
+    assert (record.time[1], record.theta.shape) == (0.01, (100, 0))
     with pytest.raises(ValueError, match="has no period"):
         record.max_error(last_periods=1)
-    record = pz.track(pz.signals.sine(1.0, 5.0, 2, 100.0), stage=wire, compensator=compensator)
+    record = pz.track(pz.signals.sine(1.0, 5.0, 2, 100.0), stage=wire, **UNITY)
     with pytest.raises(ValueError, match="last_periods is 5, the record has 2 periods"):
         record.max_error(last_periods=5)
     with pytest.raises(ValueError, match="sample rates differ"):
-        pz.track(r, stage=pz.PaperStage(sample_rate=FS), compensator=compensator, sample_rate=100.0)
+        pz.track(WAVE, stage=pz.PaperStage(sample_rate=FS), **UNITY, sample_rate=100.0)
+    nothing: Any = None
+    with pytest.raises(ValueError, match=r"must have step\(u\)"):
+        pz.track([0.0], stage=object(), controller=1, sample_rate=FS)
+    with pytest.raises(ValueError, match="must be an array, got None"):
+        pz.PaperStage(FS).run(nothing)
 
 
 def test_errors_leave_out_missing_readings() -> None:
     readings = [0.0, 1.0, None, 0.5, None, None, None, None]
     stage = SimpleNamespace(step=lambda u: readings.pop(0))
-    r = pz.signals.Signal(np.zeros(8), sample_rate=8.0, period=4)
-    record = pz.track(r, stage=stage, compensator=pz.LinearCompensator(pz.LinearGain(1.0)))
+    record = pz.track(pz.signals.Signal(np.zeros(8), sample_rate=8.0, period=4), stage=stage, **UNITY)
     assert record.max_error() == 1.0
     assert record.rms_error() == pytest.approx(np.sqrt(1.25 / 3.0))
     np.testing.assert_equal(record.max_error_per_period(), [1.0, np.nan])
@@ -43,32 +47,32 @@ def test_errors_leave_out_missing_readings() -> None:
     assert record.plot().axes
 
 
+class Learner:
+    """An estimator, or a controller, of one's own."""
+
+    model = pz.LinearGain(1.0)
+
+    def __init__(self) -> None:
+        self.seen: list[Any] = []
+
+    def step(self, r: float, x: float | None = None) -> float:
+        self.seen.append(x)
+        return r
+
+    def learn(self, u: float, x: float | None) -> None:
+        self.seen.append((u, x))
+
+
 def test_ones_own_parts_are_told_of_no_measurement_by_none() -> None:
-    deaf: Any = SimpleNamespace(sample_rate=100.0, step=lambda u: float("nan") if u > 0.0 else None)
-
-    class Learner:
-        model = pz.LinearGain(1.0)
-
-        def __init__(self) -> None:
-            self.seen: list[Any] = []
-
-        def step(self, r: float, x: float | None = None) -> float:
-            self.seen.append(x)
-            return r
-
-        def learn(self, u: float, x: float | None) -> None:
-            self.seen.append((u, x))
-
     odd: Any = SimpleNamespace(step=lambda u: ("late", [1.0], None, 0.5)[round(u)])
-    r = np.sin(np.linspace(0.0, 6.0, 100))
-    estimator, controller = Learner(), Learner()
-    line: Any = {"compensator": pz.LinearCompensator(pz.LinearGain(1.0))}
-    record = pz.track(np.arange(4.0), stage=odd, **line, sample_rate=100.0)
+    record = pz.track(np.arange(4.0), stage=odd, **UNITY, sample_rate=100.0)
     np.testing.assert_array_equal(np.isfinite(record.measured), [False, True, False, True])
-    pz.track(r, stage=deaf, **line, estimator=estimator)
-    assert estimator.seen == [None] * r.size
-    pz.track(r, stage=deaf, controller=controller)
-    assert controller.seen[1::2] == [(u, None) for u in r]
+    deaf: Any = SimpleNamespace(sample_rate=100.0, step=lambda u: float("nan") if u > 0.0 else None)
+    estimator, controller = Learner(), Learner()
+    pz.track(WAVE, stage=deaf, **UNITY, estimator=estimator)
+    assert estimator.seen == [None] * WAVE.size
+    pz.track(WAVE, stage=deaf, controller=controller)
+    assert controller.seen[1::2] == [(u, None) for u in WAVE]
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -33,20 +31,8 @@ class Noted:
 """
 
 
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Any]:
-    """Two workers in processes of their own, which do not look where the test's modules are."""
-    environment = {"NOTES": str(tmp_path / "notes.txt")}
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, env=environment
-    ) as cluster:
-        yield cluster
-
-
 @pytest.mark.slow
-def test_a_worker_killed_half_way_loses_nothing(
-    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_worker_killed_half_way_loses_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Where the workers do not look: the module has to be sent to them.
     home = tmp_path / "home"
     home.mkdir()
@@ -55,24 +41,21 @@ def test_a_worker_killed_half_way_loses_nothing(
     scenarios = ("cold-start", "two-tone")
     plan = table.Plan(estimators=estimators, scenarios=scenarios, stages=("paper",), seeds=8, given=SMALL)
     tasks = plan.tasks()
-    half = len(tasks) // 2
     said, killed, notes = [], [], tmp_path / "notes.txt"
 
     def kill_one_half_way(done: int, of: int) -> None:
         said.append((done, of))
-        if done == half:
-            # One that has worked: the last to begin with an estimator.
+        if done == len(tasks) // 2:  # one that has worked: the last to begin with an estimator
             killed.append(int(notes.read_text().split()[-1]))
             os.kill(killed[0], signal.SIGKILL)
 
-    execute = table.over_dask(cluster.scheduler_address, estimators=estimators)
-    rows = played(tasks, home, execute, kill_one_half_way)
-
+    env = {"NOTES": str(notes)}
+    with distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None, env=env) as cluster:
+        execute = table.over_dask(cluster.scheduler_address, estimators=estimators)
+        rows = played(tasks, home, execute, kill_one_half_way)
     assert said == [(k, len(tasks)) for k in range(len(tasks) + 1)]
-    assert [row["key"] for row in rows] == [task.key for task in tasks]
-    assert [row["failure"] for row in rows] == [None] * len(tasks)
+    assert [(row["key"], row["failure"]) for row in rows] == [(task.key, None) for task in tasks]
     assert {int(line) for line in notes.read_text().split()} > set(killed)
-
     assert rows == played(tasks, tmp_path / "here", table.over_cores(1))
 
 

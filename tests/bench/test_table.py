@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -21,7 +22,6 @@ from piezoest.bench.pages import write_html
 from piezoest.bench.run import COLUMNS, Task, crashed, play
 from piezoest.bench.store import append, opened, played, row_of
 from piezoest.bench.table_command import Runs, _plan
-from piezoest.records import Record
 from tests.bench.shared import SMALL, bench, kept, own_module, said
 
 OWN = """
@@ -47,8 +47,8 @@ class Quits(Still):
 class Dies(Still):
     def step(self, u, x):
         os._exit(3)
-
 """
+MACHINE = {"date": "2026-01-01", "machine": {"cpu": "x", "python": "3"}, "versions": {"numpy": "2"}}
 
 
 @pytest.fixture
@@ -68,25 +68,20 @@ def plan(*estimators: str, **given: Any) -> table.Plan:
 @pytest.mark.parametrize("name", STAGES)
 def test_a_stage_is_a_function_of_its_seed_and_has_a_loop(name: str) -> None:
     u = pz.signals.triangle(90.0, 5.0, 3.0, 2000.0).values
-    first, again, other = (make_stage(name, 2000.0, seed=seed, noise=0.0).run(u) for seed in (1, 1, 2))
-    np.testing.assert_array_equal(first, again)
-    # The paper's differs by its noise alone.
-    assert np.any(first != other) == (name != "paper")
-    gain = np.polyfit(u[800:], first[800:], 1)
+    x, again, other = (make_stage(name, 2000.0, seed=seed, noise=0.0).run(u) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(x, again)
+    assert np.any(x != other) == (name != "paper")  # which differs by its noise alone
+    gain = np.polyfit(u[800:], x[800:], 1)
     assert 0.05 < gain[0] < 0.5
-    assert np.max(np.abs(first[800:] - np.polyval(gain, u[800:]))) > 0.02 * np.ptp(first)
-    with pytest.raises(ValueError, match="stage must be one of paper"):
-        make_stage("best", 2000.0, seed=0)
+    assert np.max(np.abs(x[800:] - np.polyval(gain, u[800:]))) > 0.02 * np.ptp(x)
 
 
 def test_all_estimators_are_compared_and_all_are_told_of_the_offset() -> None:
     names = defaults()
     assert {name.partition("(")[0] for name in names} == set(found())
-    assert "AdaptiveFeedforward" in names
-    assert PAPERS in names
+    assert {"AdaptiveFeedforward", PAPERS} <= {*names}
     for name in names:
-        made = candidate(name)(2000.0, pz.ColemanHodgdon(0.02, 0.12, 0.0036))
-        assert hasattr(made, "step")
+        assert hasattr(candidate(name)(2000.0, pz.ColemanHodgdon(0.02, 0.12, 0.0036)), "step")
     assert all("offset=True" in text for text in (*KNOWN.values(), PAPERS))
 
 
@@ -117,9 +112,6 @@ def test_a_run_is_a_function_of_its_task() -> None:
     assert first["typical"] == pytest.approx(math.prod(first["errors"]) ** (1.0 / 6.0))
     assert first["worst"] >= max(first["errors"])
     json.dumps(first, allow_nan=False)
-
-
-def test_keys_tell_runs_apart() -> None:
     others = [
         task(scenario="noise"), task("HysteresisEKF"), task(stage="duhem"),
         dataclasses.replace(task(), seed=4), dataclasses.replace(task(), code="another"),
@@ -135,32 +127,15 @@ def test_an_estimators_own_file_is_part_of_its_code(own: str) -> None:
     assert code_of(f"{own}:Still") != before
 
 
-CODE = """def f(x):
-    if x:
-        "c".join(x)
-        return "a"
-"""
-
-
-@pytest.mark.parametrize(
-    ("there", "now", "same"),
-    [
-        ("    if x:", '    """What."""\n\n    if x:  # why', True),
-        ('"a"', '"b"', False),
-        ("        return", "    return", False),
-        ('"c"', '"d"', False),
-    ],
-)
-def test_comments_and_docstrings_are_no_other_code(there: str, now: str, same: bool, tmp_path: Path) -> None:
+def test_comments_and_docstrings_are_no_other_code(tmp_path: Path) -> None:
     codes = []
-    for version, its in (("before", CODE), ("after", CODE.replace(there, now))):
-        part = tmp_path / version / "part"
-        part.mkdir(parents=True)
-        (part / "module.py").write_text(its, encoding="utf-8")
-        (tmp_path / version / "other.py").write_text("x = 1\n", encoding="utf-8")
-        codes.append(code_of_parts(tmp_path / version))
-    assert codes[0]["."] == codes[1]["."]
-    assert (codes[0]["part"] == codes[1]["part"]) == same
+    texts = ('return "a"', '"""What."""\n\n    return "a"  # why', 'return "b"', '"c".join(x)', '"d".join(x)')
+    for k, text in enumerate(texts):
+        (tmp_path / str(k)).mkdir()
+        (tmp_path / str(k) / "module.py").write_text(f"def f(x):\n    {text}\n", encoding="utf-8")
+        codes.append(code_of_parts(tmp_path / str(k))["."])
+    assert codes[0] == codes[1]
+    assert len({*codes}) == 4
 
 
 @pytest.mark.parametrize(
@@ -200,7 +175,7 @@ def test_a_process_that_dies_is_a_failure_and_the_rest_goes_on(own: str, tmp_pat
 def test_a_document_sums_up(own: str, tmp_path: Path) -> None:
     ekf, still = "HysteresisEKF(offset=True)", f"{own}:Still"
     asked = plan(ekf, still, stages=("paper", "duhem"), seeds=3)
-    rows = [play(each) for each in asked.tasks()]
+    rows = list(map(play, asked.tasks()))
     document = table.describe(rows, asked, {})
     json.dumps(document, allow_nan=False)
     assert document["runs"] == len(rows) == 36
@@ -216,14 +191,11 @@ def test_a_document_sums_up(own: str, tmp_path: Path) -> None:
     assert (page.count("<table>"), page.count("data:image/png")) == (2 + 4, 4)
 
 
-MACHINE = {"date": "2026-01-01", "machine": {"cpu": "x", "python": "3"}, "versions": {"numpy": "2"}}
-
-
 def write_log(path: Path, seed: int) -> None:
     u = pz.signals.triangle(30.0, 5.0, 10.0, 2000.0).values
     x = pz.PaperStage(2000.0, seed=seed).run(u)
     x[100:110] = np.nan
-    Record.from_arrays(u, x, 2000.0).write(path)
+    pz.Record.from_arrays(u, x, 2000.0).write(path)
 
 
 def test_recorded_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -237,7 +209,7 @@ def test_recorded_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = plan("HysteresisRLS", "PrandtlIshlinskiiRLS", scenarios=tuple(logs), seeds=3)
     tasks = asked.tasks()
     assert len({each.key for each in tasks}) == 9  # whatever the seeds
-    rows = [play(each) for each in tasks]
+    rows = list(map(play, tasks))
     assert [row["failure"] is None for row in rows] == [True] * 6 + [False] * 3
     for linear, derivative, plays in (rows[:3], rows[3:6]):
         assert 0.0 < plays["settled"] < derivative["settled"] < 0.5 * linear["settled"]
@@ -254,41 +226,43 @@ def test_recorded_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         recorded.logs_of("nowhere")
 
 
-SHORT = ("--scenario", "cold-start", "--scenario", "noise", "--quick", "--only", "HysteresisEKF", "--jobs", 1)
+def read(path: str | Path) -> Any:
+    return json.loads(Path(path).read_text(encoding="utf-8"))
 
 
 @pytest.mark.slow
-def test_command_end_to_end(own: str, tmp_path: Path) -> None:
-    asked = (*SHORT, "-e", f"{own}:Broken", "--seeds", 2, "--table", "csv")
+def test_command_end_to_end(own: str) -> None:
+    asked: list[object] = ["-s", "cold-start", "--scenario", "noise", "--quick", "--only", "HysteresisEKF"]
+    asked += ["-e", f"{own}:Broken", "--seeds", 2, "--table", "csv", "--jobs", 1]
     result = bench(*asked, "--json", "a.json", "--figures", "figures")
     assert result.exit_code == 1, result.output  # one estimator has failed in all its runs
     assert "12 of 12 runs" in result.stderr
     assert "in step" in result.stdout  # the traceback of one's own estimator
     assert len(list(Path("figures").iterdir())) == 4
     folder = Path("bench-results-quick")
-    document = json.loads((folder / "table.json").read_text(encoding="utf-8"))
-    assert document == json.loads(Path("a.json").read_text(encoding="utf-8"))
+    document = read(folder / "table.json")
+    assert document == read("a.json")
     assert len(tables.read_table(folder, table.RUNS, COLUMNS)) == 12
-    for each in document["estimators"].values():
-        each["step_us"] = 3.2364  # around which alone Matplotlib leaves no width, and warns
-    figures.cost(document).savefig("cost.png")
 
     again = bench(*asked, "--json", "-")
     assert "12 of 12 runs" in again.stderr.splitlines()[1]  # nothing was run again
     assert json.loads(again.stdout)["cells"] == document["cells"]
 
-
-@pytest.mark.slow
-def test_compare_with_itself_finds_no_change(own: str) -> None:
-    assert bench(*SHORT, "-o", "one").exit_code == 0
-    result = bench("compare", "one", "one", "--json", "c.json")
+    result = bench("compare", folder, folder, "--json", "c.json")
     assert result.exit_code == 0, result.output
-    document = json.loads(Path("c.json").read_text(encoding="utf-8"))
-    assert set(document["counts"]) == {"same"}
-    assert document["pairs"] == 4
-    assert bench("compare", "one", "nowhere").exit_code == 1
-    assert bench(*SHORT, "-o", "other", "--sample-rate", 4000).exit_code == 0
-    assert bench("compare", "one", "other").exit_code == 1
+    assert set(read("c.json")["counts"]) == {"same"}
+    assert read("c.json")["pairs"] == 12
+    shutil.copytree(folder, "other")
+    document["conditions"]["rest"] = 9.0
+    Path("other/table.json").write_text(json.dumps(document), encoding="utf-8")
+    for other, words in (("nowhere", "no table.json"), ("other", "and 9.0 in B")):
+        result = bench("compare", folder, other)
+        assert result.exit_code == 1
+        assert words in said(result)
+
+    for each in document["estimators"].values():
+        each["step_us"] = 3.2364  # around which alone Matplotlib leaves no width, and warns
+    figures.cost(document).savefig("cost.png")
 
 
 @pytest.mark.parametrize(
@@ -332,20 +306,13 @@ def test_tuning_finds_settings_on_other_seeds(own: str, tmp_path: Path) -> None:
 
 def test_a_store_keeps_the_first_row_of_each_key_and_goes_on(tmp_path: Path) -> None:
     path = tmp_path / "new" / "runs.sqlite"
+    one, again, two = ({"key": key, "value": k} for k, key in enumerate("aab"))
     with opened(path) as file, opened(path) as other:
-        assert append(file, {"key": "a", "value": 1})
-        assert not append(other, {"key": "a", "value": 2})
-        assert append(other, {"key": "b", "value": 3})
+        assert [append(file, one), append(other, again)] == [True, False]
     with opened(path) as file:
-        assert append(file, {"key": "c", "value": 4})
-        assert [row_of(file, key) for key in ("c", "no", "a")] == [
-            {"key": "c", "value": 4}, None, {"key": "a", "value": 1}
-        ]  # fmt: skip
-    assert kept(path) == 3
-
-
-def test_a_file_that_is_no_store_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "runs.sqlite"
+        assert append(file, two)
+        assert [row_of(file, key) for key in ("b", "no", "a")] == [two, None, one]
+    assert kept(path) == 2
     path.write_text("no rows" * 1000)
     with pytest.raises(OSError, match=r"runs\.sqlite: file is not a database"), opened(path):
         pass

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
-from piezoest.bench.store import FILE, append, opened, played
+from piezoest.bench.store import FILE, played
 from piezoest.bench.zoo import draw, judging, play, settling, summary, tasks, traced
 from piezoest.bench.zoo.contenders import CANDIDATES, DEFAULT, Parts, contender
 from piezoest.bench.zoo.families import FAMILIES
 from piezoest.bench.zoo.faults import FAULTS
 from piezoest.bench.zoo.line import fit_line
 from piezoest.bench.zoo.references import SHAPES
-from piezoest.bench.zoo.rig import Rig
 from tests.bench import shared
 from tests.bench.shared import Line, bench, kept, own_module, said
 
@@ -23,7 +22,6 @@ SHORT = {**shared.SHORT, "family": "backlash", "fault": "none"}
 GIVEN = [f"--set={name}={value}" for name, value in SHORT.items() if name != "slew"]
 
 OWN = """
-import os
 from tests.bench.shared import Line
 
 def weak(sample_rate, limits):
@@ -35,10 +33,6 @@ class Breaks(Line):
 
     def run(self, r):
         raise RuntimeError("no idea")
-
-class Dies(Breaks):
-    def run(self, r):
-        os._exit(3)
 """
 
 
@@ -51,13 +45,8 @@ def safety(*arguments: object) -> Result:
     return bench("safety", *arguments, columns=160)
 
 
-def best_line(rig: Rig) -> Any:
-    line = fit_line(rig)
-    return lambda sample_rate, limits: Line(line.gain, line.centre, limits)
-
-
-def without_time(row: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in row.items() if name != "microseconds"}
+def read(path: Path) -> Any:
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 class Wild(Line):
@@ -68,7 +57,7 @@ class Wild(Line):
 
 
 def test_what_is_drawn_is_within_reason() -> None:
-    seen: dict[str, set[Any]] = {"family": set(), "reference": set(), "fault": set(), "mechanics": set()}
+    seen: dict[str, set[Any]] = {name: set() for name in ("family", "reference", "fault", "mechanics")}
     for seed in range(120):
         rig = draw(seed)
         row = rig.to_dict()
@@ -88,31 +77,28 @@ def test_what_is_drawn_is_within_reason() -> None:
 @pytest.mark.parametrize("block", [1, 7, 200])
 def test_a_row_is_a_function_of_its_seed(block: int) -> None:
     given = {**SHORT, "fault": "spikes", "mode": "transient", "block": block}
-    rows = [without_time(play(draw(5, **given), Parts)) for _ in range(2)]
-    assert rows[0] == rows[1]
-    assert rows[0]["failure"] is None
-    assert {*judging.ERRORS, *draw(5, **given).to_dict(), "settled", "named", "driver"} <= {*rows[0]}
-    assert without_time(play(draw(6, **given), Parts)) != rows[0]
+    row, again, other = (play(draw(seed, **given), Parts) for seed in (5, 5, 6))
+    for each in (row, again, other):
+        del each["microseconds"]
+    assert row == again != other
+    assert row["failure"] is None
+    assert {*judging.ERRORS, *draw(5, **given).to_dict(), "settled", "named", "driver"} <= {*row}
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_the_best_line_is_as_good_as_itself(seed: int) -> None:
-    rig = draw(seed, sample_rate=1000.0, block=50)
-    row = play(rig, best_line(rig))
-    assert row["worst"] <= row["line_worst"]
-    assert row["ratio"] <= 1.0 / 1.5 + 1e-12
-    assert row["cycle_ratio"] <= 1.0 / 1.5 + 1e-12
-    assert not row["rests_at_rail"]
+def test_the_best_line_is_as_good_as_itself() -> None:
+    for seed in range(12):
+        rig = draw(seed, sample_rate=1000.0, block=50)
+        line = fit_line(rig)
+        row = play(rig, lambda fs, limits, best=line: Line(best.gain, best.centre, limits))
+        assert row["worst"] <= row["line_worst"]
+        assert max(row["ratio"], row["cycle_ratio"]) <= 1.0 / 1.5 + 1e-12
+        assert not row["rests_at_rail"]
 
 
-def test_what_is_not_finite_or_outside_the_limits_is_seen() -> None:
+def test_wrong_voltages_and_a_rest_at_a_limit_are_seen() -> None:
     rig = draw(1, **SHORT)
     row = play(rig, lambda fs, limits: Wild(0.15, 0.0, limits))
     assert (row["finite"], row["within_limits"], row["failure"]) == (False, False, None)
-
-
-def test_a_rest_at_a_limit_is_seen() -> None:
-    rig = draw(1, **SHORT)
     row, traces = traced(rig, lambda fs, limits: Line(0.01, 0.0, limits))
     assert row["rests_at_rail"]
     assert row["rail"] > 2.0
@@ -125,17 +111,9 @@ def test_a_rest_at_a_limit_is_seen() -> None:
 def test_the_map_counts_periods() -> None:
     cell = settling.Cell("paper", 5.0, 10.0, 1)
     rig = settling.cell_rig(cell)
-
-    class Exact(Line):
-        def run(self, r: Any) -> Any:
-            return np.interp(r, x, u)
-
-    # A stage without hysteresis, whose inverse is known: all settles at once, but for the gain's step.
-    u = np.linspace(-100.0, 100.0, 2001)
-    x = rig.gain * u
-    ideal = cell.play(lambda fs, limits: Exact(rig.gain, 0.0, limits))
-    assert [segment["change"] for segment in ideal["segments"]] == [name for name, _, _ in settling.SEGMENTS]
-    assert ideal["segments"][-1]["periods"] is None
+    held = cell.play(lambda fs, limits: Line(rig.gain, 0.0, limits))
+    assert [segment["change"] for segment in held["segments"]] == [name for name, _, _ in settling.SEGMENTS]
+    assert held["segments"][-1]["periods"] is None
     assert rig.reference.size == sum(periods for _, _, periods in settling.SEGMENTS) * settling.PERIOD
     learnt = settling.Cell("coleman-hodgdon", 5.0, 10.0, 1).play(Parts)
     assert learnt["segments"][0]["periods"] is not None
@@ -148,8 +126,8 @@ def test_the_command_goes_on_where_it_was(tmp_path: Path) -> None:
     assert "0 of 2 runs" in first.output
     second = safety("--runs", 3, *options, *GIVEN, "--json", tmp_path / "all.json")
     assert "2 of 3 runs" in second.output
-    document = json.loads((tmp_path / "safety.json").read_text(encoding="utf-8"))
-    assert document == json.loads((tmp_path / "all.json").read_text(encoding="utf-8"))
+    document = read(tmp_path / "safety.json")
+    assert document == read(tmp_path / "all.json")
     assert document["runs"] == 3
     assert document["violations"]["failed"] == document["violations"]["not finite"] == 0
     assert len((tmp_path / "runs.csv").read_text(encoding="utf-8").splitlines()) == 4
@@ -166,7 +144,7 @@ def test_the_command_draws_a_run(tmp_path: Path) -> None:
 def test_controllers_of_ones_own(own: str, tmp_path: Path) -> None:
     result = safety("--runs", 2, "--jobs", 1, "-c", f"{own}:Breaks", "--output", tmp_path / "a", *GIVEN)
     assert result.exit_code == 0, result.output
-    document = json.loads((tmp_path / "a" / "safety.json").read_text(encoding="utf-8"))
+    document = read(tmp_path / "a" / "safety.json")
     assert document["violations"]["failed"] == 2
     assert document["worst"][0]["failure"] == "RuntimeError: no idea"
     assert contender(f"{own}:weak")(1000.0, limits=draw(1, **SHORT).limits).step(0.3) == pytest.approx(1.0)
@@ -177,16 +155,15 @@ def test_the_contest_is_among_the_estimators_of_the_default_controller() -> None
     assert [each["estimator"] for each in default.to_dict()["estimators"]] == [*CANDIDATES]
 
 
-def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
-    planned = tasks.runs(f"{own}:Dies", range(2), SHORT)
-    cell = tasks.tasks(f"{own}:Dies", settling.cells([0], families=["paper"])[:1])
-    for task in (*planned, *cell):
-        assert tasks.died(task)["failure"] == "the process died"
-        assert tasks.died(task)["key"] == task.key
-    assert summary.summarise(map(tasks.died, planned))["violations"]["failed"] == 2
-    assert settling.summarise_cells(map(tasks.died, cell))["failures"] == 1
-    with opened(tmp_path / FILE) as file:
-        assert all(append(file, tasks.died(task)) for task in (*planned, *cell))
+def test_a_process_that_dies_is_a_failure(tmp_path: Path) -> None:
+    planned = tasks.runs("line", range(2), SHORT)
+    planned += tasks.tasks("line", settling.cells([0], families=["paper"])[:1])
+    rows = [tasks.died(task) for task in planned]
+    expected = [(task.key, "the process died") for task in planned]
+    assert [(row["key"], row["failure"]) for row in rows] == expected
+    assert summary.summarise(rows[:2])["violations"]["failed"] == 2
+    assert settling.summarise_cells(rows[2:])["failures"] == 1
+    played(planned, tmp_path, lambda asked: map(tasks.died, asked))
     played(tasks.runs("parts", range(1), SHORT), tmp_path, tasks.over_cores(1))
     assert kept(tmp_path / FILE) == 4
 

@@ -1,6 +1,8 @@
 """Models handed over as often as one likes, by hand: the voltage stays near the line, and leaves a limit."""
 
 import itertools
+from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,7 @@ def hand_wired(
     r: Any, stage: Any, estimator: Any, compensator: Any, every: int = 1, wrong: float = 0.0
 ) -> tuple[Any, Any]:
     """The README's loop: true errors, and voltages; the first reading may be wrong."""
-    errors, voltages, x = np.empty(r.size), np.empty(r.size), None
+    errors, voltages, x = [], [], None
     feeds_back = isinstance(compensator, pz.IntegralFeedback)
     for k, r_k in enumerate(np.asarray(r).tolist()):
         u = compensator.step(r_k, x) if feeds_back else compensator.step(r_k)
@@ -29,8 +31,9 @@ def hand_wired(
         estimator.step(u, x)
         if k % every == 0:
             compensator.model = estimator.model
-        errors[k], voltages[k] = r_k - np.ravel(stage.displacement)[0], u
-    return errors, voltages
+        errors.append(r_k - stage.displacement)
+        voltages.append(u)
+    return np.array(errors), np.array(voltages)
 
 
 def per_period(errors: Any, periods: int) -> Any:
@@ -48,26 +51,14 @@ def best_line(r: Any, rate: float, last: int) -> float:
     return float(min(found))
 
 
-PACES = [
-    (pz.HysteresisRLS, 0.5, 5.0, 0, 1),
-    (pz.HysteresisRLS, 0.5, 30.0, 0, 1),
-    (pz.HysteresisRLS, 5.0, 20.0, 0, 1),
-]
-MORE_PACES = itertools.product(
-    (pz.HysteresisRLS, pz.OutputErrorRLS), (0.5, 5.0), (15.0, 30.0), ((1, 1), (2, 30))
-)
-
-
-@pytest.mark.parametrize(
-    ("make", "amplitude", "frequency", "seed", "every"),
-    [*PACES, *(pytest.param(*case, *pace, marks=pytest.mark.slow) for *case, pace in MORE_PACES)],
-)
-def test_no_pace_of_models_runs_away(
-    make: Any, amplitude: float, frequency: float, seed: int, every: int
-) -> None:
+@pytest.mark.slow_but_first
+@pytest.mark.parametrize("make", [pz.HysteresisRLS, pz.OutputErrorRLS])
+@pytest.mark.parametrize("amplitude", [5.0, 0.5])
+@pytest.mark.parametrize(("frequency", "every"), [(20.0, 1), (30.0, 1), (15.0, 30)])
+def test_no_pace_of_models_runs_away(make: Any, amplitude: float, frequency: float, every: int) -> None:
     r = np.asarray(pz.signals.triangle(amplitude, frequency, 8, FS))
     compensator = pz.InverseCompensator(START, LIMITS)
-    errors, voltages = hand_wired(r, pz.PaperStage(FS, seed=seed), make(FS), compensator, every)
+    errors, voltages = hand_wired(r, pz.PaperStage(FS, seed=0), make(FS), compensator, every)
     assert per_period(errors, 8)[2:].max() < best_line(r[: r.size // 2], FS, r.size // 4)
     assert LIMITS.minimum <= voltages.min() <= voltages.max() <= LIMITS.maximum
 
@@ -96,31 +87,28 @@ def test_a_wrong_first_reading_does_not_leave_the_voltage_at_a_limit(make: Any, 
     gain = float(np.exp(rng.uniform(np.log(0.6), np.log(1.6)))) * rig.gain
     wrong = rig.plain.amplitude * rng.uniform(0.3, 1.5) * float(rng.choice([-1.0, 1.0]))
     start = pz.ColemanHodgdon.from_loop(1.5 / rig.reach.half, 0.2 * gain, gain)
-    estimator, compensator = (
-        make(rig.sample_rate, initial_model=start),
-        pz.InverseCompensator(start, rig.limits),
-    )
+    estimator = make(rig.sample_rate, initial_model=start)
+    compensator = pz.InverseCompensator(start, rig.limits)
     _, u = hand_wired(rig.reference, rig.stage(), estimator, compensator, wrong=wrong)
     u = u[-min(2 * rig.plain.cycle, u.size // 3) :]
     assert np.mean((u <= rig.limits.minimum) | (u >= rig.limits.maximum)) < 0.75
 
 
-def unipolar(seed: int) -> pz.SimulatedStage:
-    paper, gauge = pz.PaperStage(FS), Gauge(noise=1.2e-3)
-    return pz.SimulatedStage(FS, paper.hysteresis, paper.creep, paper.mechanics, gauge=gauge, seed=seed)
-
-
 @pytest.mark.parametrize("every", [1, 50])
 def test_a_unipolar_stage_with_an_identified_start_settles(every: int) -> None:
+    def unipolar(seed: int) -> pz.SimulatedStage:
+        paper, gauge = pz.PaperStage(FS), Gauge(noise=1.2e-3)
+        return pz.SimulatedStage(FS, paper.hysteresis, paper.creep, paper.mechanics, gauge=gauge, seed=seed)
+
     s = np.linspace(0.0, 1.0, int(0.2 * FS))
-    up = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-    centre = 8.0
-    r = np.concatenate([centre * up, centre + np.asarray(pz.signals.triangle(5.0, 5.0, 6, FS))])
-    log = 6.5 * np.concatenate([centre * up, centre + np.asarray(pz.signals.triangle(7.0, 5.0, 3, FS))])
+    up, centre = s**3 * (10.0 - 15.0 * s + 6.0 * s**2), 8.0
+    r, log = (
+        np.concatenate([centre * up, centre + np.asarray(pz.signals.triangle(amplitude, 5.0, periods, FS))])
+        for amplitude, periods in ((5.0, 6), (7.0, 3))
+    )
     identified = pz.BatchFit(FS)
-    identified.run(log, unipolar(1).run(log))
-    model = identified.model
-    assert isinstance(model, pz.ColemanHodgdon)
+    identified.run(6.5 * log, unipolar(1).run(6.5 * log))
+    model: Any = identified.model
     estimator = pz.HysteresisRLS(FS, initial_model=model)
     compensator = pz.InverseCompensator(model, pz.VoltageLimits(0.0, 150.0))
     errors, voltages = hand_wired(r, unipolar(0), estimator, compensator, every)
@@ -128,19 +116,23 @@ def test_a_unipolar_stage_with_an_identified_start_settles(every: int) -> None:
     assert 0.0 <= voltages.min() <= voltages.max() <= 150.0
 
 
+def handed_over(compensator: Any, r: Any, models: Iterable[Any]) -> Any:
+    """Voltages of a compensator that is given one model after the other."""
+    u = []
+    for r_k, model in zip(r.tolist(), models, strict=False):
+        u.append(compensator.step(r_k))
+        compensator.model = model
+    return np.array(u)
+
+
 def test_whatever_is_handed_over_the_voltage_stays_in_the_corridor() -> None:
     rng = np.random.default_rng(3)
-    line = pz.LinearGain(0.15)
+    gains = 0.15 * 10.0 ** rng.uniform(-3.0, 3.0, 30_000)
+    models = (pz.ColemanHodgdon.from_loop(0.05, 0.4 * gain, gain, float(rng.normal())) for gain in gains)
     r = 5.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(30_000) / 10_000.0)
-    compensator = pz.InverseCompensator(line, transfer_samples=20)
-    wild = np.empty(r.size)
-    for k, r_k in enumerate(r.tolist()):
-        wild[k] = compensator.step(r_k)
-        gain = 0.15 * 10.0 ** rng.uniform(-3.0, 3.0)
-        compensator.model = pz.ColemanHodgdon.from_loop(0.05, 0.4 * gain, gain, float(rng.normal()))
+    wild = handed_over(pz.InverseCompensator(pz.LinearGain(0.15), transfer_samples=20), r, models)
     # Models as wild as these may lead the line away by a quarter in each turn, by more in the first two.
-    amplitude = 5.0 / 0.15
-    assert np.abs(wild[:1500]).max() < 4.0 * amplitude + 1e-9
+    assert np.abs(wild[:1500]).max() < 4.0 * 5.0 / 0.15 + 1e-9
     legs = [np.abs(wild[k : k + 1000]).max() for k in range(1500, 29_000, 1000)]
     assert max(later / before for before, later in itertools.pairwise(legs)) < 2.0
     assert np.all(np.isfinite(wild))
@@ -181,51 +173,47 @@ positive = st.floats(min_value=5e-324, max_value=1.7e308)
 def test_every_voltage_is_finite_and_within_its_limits(
     numbers: Any, line: Any, plays: Any, r: list[float]
 ) -> None:
-    def made(make: Any) -> list[Any]:
-        try:
-            with np.errstate(all="ignore"):
-                return [make()]
-        except ValueError:
-            return []
-
-    models = [
-        *made(lambda: pz.ColemanHodgdon(*numbers)),
-        *made(lambda: pz.ColemanHodgdon(*numbers).nearest_admissible()),
-        *made(lambda: pz.LinearGain(*line)),
-        *made(lambda: pz.PrandtlIshlinskii(plays[0], [plays[1]], [plays[2]], plays[3])),
-    ]
+    models: list[Any] = [START]
+    for make in (
+        lambda: pz.ColemanHodgdon(*numbers),
+        lambda: pz.ColemanHodgdon(*numbers).nearest_admissible(),
+        lambda: pz.LinearGain(*line),
+        lambda: pz.PrandtlIshlinskii(plays[0], [plays[1]], [plays[2]], plays[3]),
+    ):
+        with suppress(ValueError), np.errstate(all="ignore"):
+            models.append(make())
     slow = pz.VoltageLimits(-50.0, 50.0, slew_rate=1000.0, sample_rate=1000.0)
     for limits in (LIMITS, pz.VoltageLimits(0.0, 150.0), pz.VoltageLimits(), slow):
-        for start in (START, *models):
-            for compensator in made(lambda start=start, limits=limits: pz.InverseCompensator(start, limits)):
-                for k, r_k in enumerate(r * 2):
-                    before, u = compensator.voltage, compensator.step(r_k)
-                    assert np.isfinite(u)
-                    assert abs(u - before) <= limits.largest_step * (1.0 + 1e-9)
-                    assert limits.minimum <= u <= limits.maximum
-                    if models:
-                        with np.errstate(all="ignore"):
-                            compensator.model = models[k % len(models)]
+        for start in models:
+            try:
+                with np.errstate(all="ignore"):
+                    compensator = pz.InverseCompensator(start, limits)
+            except ValueError:
+                continue
+            for k, r_k in enumerate(r * 2):
+                before, u = compensator.voltage, compensator.step(r_k)
+                assert np.isfinite(u)
+                assert abs(u - before) <= limits.largest_step * (1.0 + 1e-9)
+                assert limits.minimum <= u <= limits.maximum
+                with np.errstate(all="ignore"):
+                    compensator.model = models[k % len(models)]
 
 
 SLOW = 2000.0
 
 
-def small_scan(amplitude: float, r: Any = None) -> Any:
-    """Error per period of a loop that learns, in a scan of 25 periods after a move to 15 µm [amplitudes]."""
-    periods = 25
-    if r is None:
-        r = 15.0 + np.asarray(pz.signals.triangle(amplitude, 10.0, periods, SLOW))
-        r = np.concatenate([np.linspace(0.0, 15.0, 800), r])
+def small_scan(r: Any, periods: int = 25) -> Any:
+    """Largest error of each of the last periods, at 10 Hz, of a loop that learns."""
     stage = pz.SimulatedStage(SLOW, pz.PaperStage(SLOW).hysteresis, gauge=Gauge(noise=1e-3), seed=0)
     compensator = pz.InverseCompensator(START, pz.VoltageLimits(-60.0, 150.0))
     errors, _ = hand_wired(r, stage, pz.HysteresisRLS(SLOW), compensator)
-    return per_period(errors[-round(periods * SLOW / 10.0) :], periods) / amplitude
+    return per_period(errors[-round(periods * SLOW / 10.0) :], periods)
 
 
 @pytest.mark.parametrize("amplitude", [0.2, 0.3])
 def test_a_small_scan_after_a_large_move_learns(amplitude: float) -> None:
-    errors = small_scan(amplitude)
+    scan = 15.0 + np.asarray(pz.signals.triangle(amplitude, 10.0, 25, SLOW))
+    errors = small_scan(np.concatenate([np.linspace(0.0, 15.0, 800), scan])) / amplitude
     assert errors[-3:].max() < 1.0
     assert errors[1:].max() < 8.0
 
@@ -234,24 +222,14 @@ def test_a_small_scan_after_a_large_move_learns(amplitude: float) -> None:
 def test_a_wrong_sample_of_the_reference_ends_no_learning(wrong: float) -> None:
     r = np.asarray(pz.signals.triangle(5.0, 10.0, 25, SLOW)).copy()
     r[250] += wrong
-    assert small_scan(5.0, r)[-3:].max() < 0.02
+    assert small_scan(r)[-3:].max() < 0.1
 
 
-def test_models_without_an_inverse_leave_the_corridor_on() -> None:
-    compensator = pz.InverseCompensator(pz.LinearGain(0.1))
-    r = np.asarray(pz.signals.triangle(1.0, 10.0, 6, SLOW))
-    for k, r_k in enumerate(r.tolist()):
-        compensator.step(r_k)
-        compensator.model = pz.LinearGain(0.1, 0.0 if k < 400 else 1e12)
-    assert compensator.state["corridor"]["soon"]
-    assert compensator.model == pz.LinearGain(0.1)
-
-
-def test_a_model_that_is_absurd_leads_the_corridor_nowhere() -> None:
+@pytest.mark.parametrize("offset", [1e6, 1e12])
+def test_models_that_are_absurd_or_have_no_inverse_lead_the_corridor_nowhere(offset: float) -> None:
     compensator = pz.InverseCompensator(pz.LinearGain(0.1))
     r = np.asarray(pz.signals.triangle(1.0, 10.0, 40, SLOW))
-    u = np.empty(r.size)
-    for k, r_k in enumerate(r.tolist()):
-        u[k] = compensator.step(r_k)
-        compensator.model = pz.LinearGain(0.1, 1e-9 * (k % 2) + (0.0 if k < 800 else 1e6))
+    offsets = [1e-9 * (k % 2) + (0.0 if k < 800 else offset) for k in range(r.size)]
+    u = handed_over(compensator, r, (pz.LinearGain(0.1, each) for each in offsets))
     assert np.abs(u).max() < 20.0
+    assert compensator.state["corridor"]["soon"]

@@ -7,10 +7,9 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
-from piezoest.controller import duhem, duhem_rls, team
-from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
+from piezoest.controller import duhem, duhem_rls
 from piezoest.layout import MEASURED, Named, new, record
-from tests.controller.shared import DRIFTING, LIMITS, drive, in_blocks, stands_along
+from tests.controller.shared import DRIFTING, LIMITS, in_blocks, stands_along
 
 FS = 5000.0
 # What `candidate` has around an inverse.
@@ -41,12 +40,11 @@ def learnt(u: FloatArray, x: FloatArray, state: Any = None) -> Any:
     return state
 
 
-def triangle(periods: int, samples: int = 1000) -> FloatArray:
-    return pz.signals.triangle(1.0, 1.0, periods, float(samples)).values
+def triangle(periods: int) -> FloatArray:
+    return pz.signals.triangle(1.0, 1.0, periods, 1000.0).values
 
 
 def test_the_papers_model_is_one_of_these() -> None:
-    """(1) of the paper: the same parameters in both directions, but for two signs."""
     model = pz.ColemanHodgdon(alpha=0.8, beta=0.7, gamma=0.72)
     p = (model.beta, model.gamma, 0.0, -model.alpha, model.beta, -model.gamma, 0.0, model.alpha)
     u = 0.8 * triangle(3) + 0.2 * np.sin(np.arange(3000) / 150.0)
@@ -54,7 +52,7 @@ def test_the_papers_model_is_one_of_these() -> None:
     np.testing.assert_allclose(follows(p, u), expected, rtol=0.0, atol=1e-5)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_inverse_is_exact_wherever_it_turns(seed: int) -> None:
     rng = np.random.default_rng(seed)
     own, given = placed(BOTH, 0.0, 0.0)
@@ -77,46 +75,21 @@ def test_the_slope_is_never_zero_nor_endless(p: Any, r: float) -> None:
     assert np.isfinite(duhem.moved(given.inverse.p, 0.0, 0.0, wanted))
 
 
-@pytest.mark.parametrize("noise", [0.0, 2e-4])
-def test_it_learns_a_stage_of_its_kind_in_two_periods(noise: float) -> None:
-    """Also while the stage still drifts: what it then does for two more periods is foreseen."""
-    u = 0.25 * triangle(8) + 0.3 * np.minimum(np.arange(8000) / 250.0, 1.0)
-    x = follows(BOTH, u)
-    seen = x + noise * np.random.default_rng(1).normal(size=x.size)
-    state = learnt(u[:2250], seen[:2250])
-    drifts = abs(x[2250] - x[7250])
-    foreseen = np.empty(2000)
-    at, before = float(state.level), u[2249]
-    for k in range(2000):
-        at = duhem.moved(state.p, at, before, u[2250 + k])
-        foreseen[k], before = at, u[2250 + k]
-    assert drifts > 0.015
-    assert np.abs(foreseen - x[2250:4250]).max() < (0.002 if noise == 0.0 else 0.004)
-
-
 def test_the_displacement_never_runs_away_from_itself() -> None:
-    """Readings that grow by themselves are no hysteresis."""
     u = triangle(6)
-    x = u * (1.0 + 0.4 * np.arange(u.size) / u.size)
-    state = learnt(u, x)
+    state = learnt(u, u * (1.0 + 0.4 * np.arange(u.size) / u.size))
     assert state.p[duhem.TERMS - 1] <= 0.0 <= state.p[2 * duhem.TERMS - 1]
     assert np.abs(follows(state.p, np.tile(triangle(1), 50))).max() < 2.0
 
 
-def test_missing_readings_leave_the_model_as_it_is() -> None:
-    u = triangle(6)
+@pytest.mark.parametrize("missing", ["a gap", "three of four"])
+def test_it_learns_where_readings_are_missing(missing: str) -> None:
+    u, seen = triangle(6), np.arange(6000) % 4 == 0
+    if missing == "a gap":
+        seen = np.ones(6000, dtype=bool)
+        seen[3100:3800] = seen[5000::3] = False
     x = follows(BOTH, u)
-    gap = x.copy()
-    gap[3100:3800] = np.nan
-    gap[5000::3] = np.nan
-    state, other = learnt(u, gap), learnt(u, x)
-    np.testing.assert_allclose(follows(state.p, u), follows(other.p, u), rtol=0.0, atol=2e-3)
-
-
-def test_a_sensor_that_reads_every_fourth_sample_will_do() -> None:
-    u = triangle(6)
-    x = follows(BOTH, u)
-    state = learnt(u, np.where(np.arange(u.size) % 4 == 0, x, np.nan))
+    state = learnt(u, np.where(seen, x, np.nan))
     np.testing.assert_allclose(follows(state.p, u), x, rtol=0.0, atol=2e-3)
 
 
@@ -144,32 +117,11 @@ def test_nonsense_leaves_numbers() -> None:
     assert np.all(np.diag(np.array(state.P)) > 0.0)
 
 
-def test_it_is_handed_over_when_it_has_learnt_something_and_goes_on_from_there() -> None:
-    model = Named(new(duhem.MODEL), duhem.MODEL)
-    u = triangle(4)
-    x = follows(BOTH, u)
-    state = learnt(u[:1], x[:1])
-    assert duhem_rls.write_model(state, None, model) == NO_MODEL
-    learnt(u[1:2000], x[1:2000], state)
-    assert duhem_rls.write_model(state, None, model) == TO_BE_PLACED
-    assert model.x == pytest.approx(x[1999], abs=0.02)
-
-
 @pytest.mark.parametrize("amplitude", [0.2, 1.0, 2.0])
 def test_a_stage_that_drifts_to_its_loop_settles_in_the_third_period(amplitude: float) -> None:
-    """Without the model it missed 11 and 4 % of 1 and 2 µm there; without room for drift 20 % of 0.2 µm."""
+    # Without the model 11 and 4 % of 1 and 2 µm were missed there; without room for drift 20 % of 0.2 µm.
     stage = pz.SimulatedStage(FS, DRIFTING, gauge=pz.Gauge(noise=2e-4), seed=2)
-    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
     r = pz.signals.triangle(amplitude, 5.0, 6, FS).values
-    _, x = in_blocks(driver, stage, r, 10)
+    _, x = in_blocks(pz.AdaptiveFeedforward(FS, limits=LIMITS), stage, r, 10)
     worst = np.abs(r - x).reshape(6, -1).max(axis=1) / amplitude
     assert worst[2:].max() < 0.012, worst
-
-
-def test_it_has_a_name_and_no_model_of_its_own() -> None:
-    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
-    assert [each.name for each in driver.candidates][-2:] == [team.DUHEM, team.RECORDED]
-    drive(driver, pz.PaperStage(FS, seed=0), pz.signals.triangle(3.0, 10.0, 4, FS).values)
-    missed = {each.name: each.missed or np.inf for each in driver.candidates}
-    assert missed[team.DUHEM] < 0.2 * missed["line"]
-    assert len(pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=()).candidates) == 1

@@ -15,6 +15,7 @@ from tests.controller.shared import LIMITS, LOOP, drive, last_error, read_back
 FS = 5000.0
 PLAYS = pz.PrandtlIshlinskii(0.1, [2.0, 6.0, 12.0, 20.0, 30.0], [0.02, 0.02, 0.015, 0.01, 0.01])
 SINE = pz.signals.sine(3.0, 10.0, 1, FS).values
+TWENTY = np.tile(SINE, 20)
 
 
 def controller(limits: pz.VoltageLimits = LIMITS, estimators: Any = (), **options: Any) -> Any:
@@ -47,10 +48,8 @@ def test_the_voltage_swings_less_and_less(name: str) -> None:
     steps = np.abs(np.diff(swept, prepend=before))
     assert max(steps[0], steps[-1]) < 0.05 * steps.max()
     assert steps.max() <= limits.largest_step
-    turned = np.flatnonzero(np.diff(np.sign(np.diff(swept))) != 0.0)
-    extremes = np.abs(swept[turned + 1] - middle)
-    extremes = extremes[extremes > 0.01 * amplitude][-2 * options.get("cycles", 10) + 2 :]
-    assert np.all(np.diff(extremes) < 0.0)
+    extremes = np.abs(swept[1:-1] - middle)[np.diff(np.sign(np.diff(swept))) != 0.0]
+    assert np.all(np.diff(extremes[extremes > 0.01 * amplitude][-2 * options.get("cycles", 10) + 2 :]) < 0.0)
     # Nothing was in the way of the sweep itself.
     again = controller(limits)
     again.home(**options)
@@ -58,11 +57,15 @@ def test_the_voltage_swings_less_and_less(name: str) -> None:
     assert (again.status.slewed, again.status.saturated) == (0, 0)
 
 
+# To an extreme and back.
+AWAY = np.concatenate([np.linspace(0.0, 50.0, 200), np.linspace(50.0, 0.0, 200)])
+
+
 def test_it_erases_what_the_stage_remembers() -> None:
     displacements = []
-    for extreme in (50.0, -50.0):
+    for way in (AWAY, -AWAY):
         driver, stage = controller(), pz.SimulatedStage(FS, PLAYS)
-        stage.run(np.concatenate([np.linspace(0.0, extreme, 200), np.linspace(extreme, 0.0, 200)]))
+        stage.run(way)
         assert abs(stage.step(0.0)) > 0.5
         driver.home(frequency=20.0)
         while driver.status.stage == "homing":
@@ -72,61 +75,47 @@ def test_it_erases_what_the_stage_remembers() -> None:
 
 
 def test_the_models_know_the_stage_again() -> None:
-    """One that drove before is right again after a sweep, whatever the stage went through meanwhile."""
     driver, stage = controller(estimators=None), pz.SimulatedStage(FS, PLAYS)
     drive(driver, stage, np.tile(SINE, 60))
     assert driver.status.driving != "line"
     driver, stage = read_back(driver), pz.SimulatedStage(FS, PLAYS)
-    stage.run(np.concatenate([np.linspace(0.0, -50.0, 200), np.linspace(-50.0, 0.0, 200)]))
+    stage.run(-AWAY)
     driver.learn(0.0, None)
     driver.home(frequency=20.0)
     assert driver.status.driving == "line"
-    r = np.tile(SINE, 20)
-    drive(driver, stage, np.zeros(2 * r.size)[:2624])
-    _, x, doing = drive(driver, stage, r)
+    drive(driver, stage, np.zeros(2624))
+    _, x, doing = drive(driver, stage, TWENTY)
     assert doing[-1] == "running"
     assert driver.status.driving != "line"
-    assert last_error(r, x) < 0.05
+    assert last_error(TWENTY, x) < 0.05
     assert driver.events == ()
 
 
-@pytest.mark.parametrize("gain", [None, 0.2])
-def test_without_a_gain_it_seeks_then(gain: float | None) -> None:
+@pytest.mark.parametrize(
+    ("gain", "before", "stages"),
+    [(None, 0, ["homing", "seeking"]), (0.2, 0, ["homing", "seeking"]), (None, 10, ["homing"])],
+)
+def test_it_needs_no_gain_and_no_readings(gain: float | None, before: int, stages: list[str]) -> None:
     driver, stage = controller(gain=gain), pz.SimulatedStage(FS, LOOP)
+    drive(driver, stage, np.tile(SINE, before))
     driver.home(30.0, 20.0, 3)
-    r = np.tile(SINE, 20)
-    _, x, doing = drive(driver, stage, r)
-    assert list(dict.fromkeys(doing)) == ["homing", "seeking", "approaching", "running"]
-    assert last_error(r, x) < 0.5
-
-
-def test_readings_that_are_missing_do_not_matter() -> None:
-    driver, stage = controller(), pz.SimulatedStage(FS, LOOP)
-    drive(driver, stage, np.tile(SINE, 10))
-    driver.home(20.0, 50.0, 5)
-    while driver.status.stage == "homing":
-        stage.step(driver.step(0.0))
-        driver.learn(driver.voltage, None)
-    assert driver.status.stage == "approaching"
-    _, x, doing = drive(driver, stage, np.tile(SINE, 10))
-    assert doing[-1] == "running"
-    assert last_error(np.tile(SINE, 10), x) < 0.5
+    run = drive(driver, stage, TWENTY, lambda _, x: None if driver.status.stage == "homing" else x)
+    assert list(dict.fromkeys(run.doing)) == [*stages, "approaching", "running"]
+    assert last_error(TWENTY, run.x) < 0.5
 
 
 @pytest.mark.parametrize("after", [0, 100, 400, 900])
 def test_it_goes_on_in_copies_files_and_blocks(after: int) -> None:
-    driver, stage = controller(), pz.SimulatedStage(FS, LOOP)
+    driver, stage, r = controller(), pz.SimulatedStage(FS, LOOP), np.tile(SINE, 3)
     drive(driver, stage, np.tile(SINE, 4))
     driver.home(20.0, 40.0, 5)
     drive(driver, stage, np.zeros(after))
-    r = np.tile(SINE, 3)
-    others = [driver.copy(), read_back(driver), driver.copy()]
-    stages = [copy.deepcopy(stage) for _ in others]
-    u = drive(driver, stage, r)[0]
-    for other, own in list(zip(others, stages, strict=True))[:2]:
-        np.testing.assert_array_equal(drive(other, own, r)[0], u)
+    others, blocks = (driver.copy(), read_back(driver)), driver.copy()
+    stages = [copy.deepcopy(stage) for _ in range(3)]
+    u = drive(driver, stage, r).u
+    for other, own in zip(others, stages[:2], strict=True):
+        np.testing.assert_array_equal(drive(other, own, r).u, u)
         assert other.to_dict() == driver.to_dict()
-    blocks = others[2]
     left = max(0, 700 - after)  # the way there and five cycles of 125 samples, about
     for start in range(0, left - left % 25, 25):
         planned = blocks.run(r[start : start + 25])
@@ -135,9 +124,8 @@ def test_it_goes_on_in_copies_files_and_blocks(after: int) -> None:
 
 
 def test_the_next_day_it_goes_from_where_the_stage_rests() -> None:
-    """The first voltage would be that of the reference, and that of an amplifier just on is far from it."""
     driver, stage = controller(estimators=None), pz.SimulatedStage(FS, PLAYS)
-    r = np.tile(SINE, 20) + 4.0
+    r = TWENTY + 4.0
     drive(driver, stage, r)
     assert driver.voltage > 20.0
     driver, rest = read_back(driver), -5.0
@@ -157,21 +145,34 @@ def test_a_controller_that_knows_nothing_resumes_as_if_reset() -> None:
     drive(one, pz.SimulatedStage(FS, LOOP), SINE[:3])
     one.resume(5.0, 1.0)
     other.reset(5.0, 1.0)
-    stages = pz.SimulatedStage(FS, LOOP), pz.SimulatedStage(FS, LOOP)
-    u = [drive(each, stage, np.tile(SINE, 2)).u for each, stage in zip((one, other), stages, strict=True)]
-    np.testing.assert_array_equal(u[0], u[1])
+    first, second = (drive(each, pz.SimulatedStage(FS, LOOP), np.tile(SINE, 2)).u for each in (one, other))
+    np.testing.assert_array_equal(first, second)
 
 
-def test_it_resumes_from_a_fault_without_it() -> None:
-    driver, stage = learnt()
+@pytest.fixture(scope="module")
+def once() -> tuple[Any, Any]:
+    driver, stage = controller(estimators=(pz.OutputErrorRLS,)), pz.SimulatedStage(FS, LOOP)
+    drive(driver, stage, TWENTY)
+    assert driver.status.driving != "line"
+    return driver, stage
+
+
+@pytest.fixture
+def learnt(once: Any) -> Any:
+    """A controller that has learnt its stage, and that stage."""
+    return copy.deepcopy(once)
+
+
+def test_it_resumes_from_a_fault_without_it(learnt: Any) -> None:
+    driver, stage = learnt
     drive(driver, stage, np.tile(SINE, 2), lambda k, x: 1.0)
     assert driver.status.fault != ""
     driver.resume(0.0, float(stage.run(np.linspace(driver.voltage, 0.0, 100))[-1]))
     assert driver.status.fault == ""
 
 
-def test_a_write_that_is_lost_within_a_block_does_not_widen_the_corridor() -> None:
-    driver, stage = learnt()
+def test_a_write_that_is_lost_within_a_block_does_not_widen_the_corridor(learnt: Any) -> None:
+    driver, stage = learnt
     before = float(driver.state["widest"])
     u = driver.run(SINE[:60])
     x = stage.run(u)
@@ -183,23 +184,16 @@ def test_a_write_that_is_lost_within_a_block_does_not_widen_the_corridor() -> No
 @pytest.mark.parametrize(
     "wrong", [(70.0, 0.0), (np.nan, 0.0), (None, 0.0), (0.0, None), (0.0, np.inf), (0.0, 1e30)]
 )
-def test_a_rest_that_cannot_be_is_refused(wrong: Any) -> None:
-    driver, _ = learnt()
+def test_a_rest_that_cannot_be_is_refused(learnt: Any, wrong: Any) -> None:
+    driver, _ = learnt
     before = driver.to_dict()
     with pytest.raises(ValueError, match=r"(voltage|displacement) must"):
         driver.resume(*wrong)
     assert driver.to_dict() == before
 
 
-def learnt(estimators: Any = (pz.OutputErrorRLS,)) -> tuple[Any, Any]:
-    driver, stage = controller(estimators=estimators), pz.SimulatedStage(FS, LOOP)
-    drive(driver, stage, np.tile(SINE, 20))
-    assert driver.status.driving != "line"
-    return driver, stage
-
-
-def test_a_write_that_may_be_lost_makes_the_line_drive() -> None:
-    driver, stage = learnt()
+def test_a_write_that_may_be_lost_makes_the_line_drive(learnt: Any) -> None:
+    driver, stage = learnt
     before = len(driver.events)
     # Several in a row: the planned voltage and the last one that is known part.
     planned = drive(driver, stage, SINE[:40], told=lambda u: None).u
@@ -208,19 +202,17 @@ def test_a_write_that_may_be_lost_makes_the_line_drive() -> None:
     assert driver.events[-1].action == "went on"
     assert driver.events[-1].reason.startswith("unknown voltage: ")
     assert driver.candidates[1].missed is None
-    assert np.abs(np.diff(planned)).max() < 2.0 * np.abs(np.diff(drive(driver, stage, SINE)[0])).max()
-    rest = np.tile(SINE, 20)
-    _, x, _ = drive(driver, stage, rest)
+    assert np.abs(np.diff(planned)).max() < 2.0 * np.abs(np.diff(drive(driver, stage, SINE).u)).max()
+    x = drive(driver, stage, TWENTY).x
     assert driver.status.driving != "line"
-    assert last_error(rest, x, 500) < 0.05
+    assert last_error(TWENTY, x, 500) < 0.05
 
 
-def test_one_that_changes_nothing_does_not_matter() -> None:
-    driver, stage = learnt()
+def test_one_that_changes_nothing_does_not_matter(learnt: Any) -> None:
+    driver, stage = learnt
     r = np.concatenate([np.tile(SINE, 2), SINE[:125], np.full(50, SINE[124])])  # at rest at the top
     drive(driver, stage, r)
-    before = driver.events
-    known = driver.copy()
+    before, known = driver.events, driver.copy()
     u = driver.step(SINE[124])
     driver.learn(None, stage.step(u))
     known.learn(known.step(SINE[124]), np.nan)
@@ -230,20 +222,18 @@ def test_one_that_changes_nothing_does_not_matter() -> None:
 
 
 @pytest.mark.parametrize("said", ["unknown", "nothing"])
-def test_for_long_without_news_of_the_voltage_it_follows_the_line(said: str) -> None:
-    """All are written, but nobody says so: no jump, and the stage is not farther off than by the line."""
-    (driver, stage), (_, other) = learnt(), learnt()
-    straight = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), gain=driver.candidates[0].model.gain)
-    line = float(np.abs(np.tile(SINE, 20) - drive(straight, other, np.tile(SINE, 20)).x)[-1000:].max())
-    r = np.tile(SINE, 6)
+def test_for_long_without_news_of_the_voltage_it_follows_the_line(learnt: Any, said: str) -> None:
+    (driver, stage), (_, other) = learnt, copy.deepcopy(learnt)
+    straight = controller(gain=driver.candidates[0].model.gain)
+    line, r = last_error(TWENTY, drive(straight, other, TWENTY).x), np.tile(SINE, 6)
     left_out = () if said == "unknown" else range(r.size)
     u, x, _ = drive(driver, stage, r, left_out=left_out, told=lambda u: None)
     assert np.abs(r - x).max() < 1.2 * line
     assert np.abs(np.diff(u)).max() < 2.5 * np.abs(np.diff(drive(driver, stage, r).u)).max()
 
 
-def test_steps_without_a_write_go_on_along_the_line() -> None:
-    driver, stage = learnt()
+def test_steps_without_a_write_go_on_along_the_line(learnt: Any) -> None:
+    driver, stage = learnt
     drive(driver, stage, SINE[:60])
     first = driver.step(SINE[60])
     assert driver.step(SINE[60]) == first  # nobody knows of the first one

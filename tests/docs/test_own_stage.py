@@ -1,6 +1,7 @@
 """The program for hardware, `examples/own_stage.py`, on simulated drivers, of which some fail."""
 
 import importlib
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,25 +27,20 @@ def program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
     return module
 
 
-def driver(program: Any, fails_at: int | None = None, error: BaseException | None = None) -> Any:
+def driver(program: Any, fails_at: int = -1, error: BaseException | None = None) -> Any:
     """The program's own driver, which keeps what was written and may fail once."""
 
-    class Watched(program.Driver):  # type: ignore[misc]
-        def __init__(self) -> None:
-            super().__init__()
-            self.written: list[float] = []
+    used = program.Driver()
+    used.written, write = [], used.write
 
-        def write(self, voltage: float) -> None:
-            if len(self.written) == fails_at and error is not None:
-                self.written.append(np.nan)
-                raise error
-            self.written.append(voltage)
-            super().write(voltage)
+    def watched(voltage: float) -> None:
+        used.written.append(voltage)
+        if len(used.written) == fails_at + 1 and error is not None:
+            raise error
+        write(voltage)
 
-        def close(self) -> None:
-            self.written.append(np.inf)
-
-    return Watched()
+    used.write, used.close = watched, partial(used.written.append, np.inf)
+    return used
 
 
 def test_it_follows_and_ends_at_rest(program: Any) -> None:
@@ -67,14 +63,14 @@ def test_it_follows_and_ends_at_rest(program: Any) -> None:
 @pytest.mark.parametrize("error", [OSError("the cable is off"), KeyboardInterrupt()])
 def test_a_run_that_is_cut_short_is_kept_and_ends_at_rest(program: Any, error: Any, capsys: Any) -> None:
     ramp = int(program.BIAS / program.SLOPE * program.RATE)
-    used = driver(program, fails_at=ramp + 700, error=error)
+    used = driver(program, ramp + 700, error)
     assert program.main(used) == 1
     assert f"stopped: {type(error).__name__}" in capsys.readouterr().err
-    record = np.load("run.npz")
-    assert record["voltage"].size == 700
-    assert np.all(np.isfinite(record["voltage"]))
+    voltage = np.load("run.npz")["voltage"]
+    assert voltage.size == 700
+    assert np.all(np.isfinite(voltage))
     assert used.written[-2:] == [program.REST, np.inf]
-    after = np.diff(used.written[ramp + 701 : -1], prepend=record["voltage"][-1])
+    after = np.diff(used.written[ramp + 701 : -1], prepend=voltage[-1])
     assert np.max(np.abs(after)) <= program.SLOPE / program.RATE * 1.001
 
 

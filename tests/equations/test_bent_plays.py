@@ -1,7 +1,4 @@
-"""Bent plays: segments, the walk of the inverse, the memory of turning points, Preisach's properties."""
-
-import itertools
-from typing import Any
+"""Plays, straight and bent: the exact inverse, the memory of turning points, Preisach's properties."""
 
 import numpy as np
 from hypothesis import given, settings
@@ -15,7 +12,19 @@ from piezoest.layout import Named, new
 RATE = 1000.0
 
 
-def random_model(seed: int, bends: int = 3) -> pz.PrandtlIshlinskii:
+@given(st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=12), st.floats(0.0, 20.0))
+def test_play_is_a_piston_in_a_cylinder(u: list[float], r: float) -> None:
+    y = piston = 0.0
+    for value in u:
+        y = play(y, value, r)
+        if value - piston > r:
+            piston = value - r
+        elif value - piston < -r:
+            piston = value + r
+        assert y == piston
+
+
+def random_model(seed: int, bends: int) -> pz.PrandtlIshlinskii:
     """Admissible, with weights of both signs, bends and creep."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 8))
@@ -42,40 +51,35 @@ def test_inverse_is_exact(seed: int, bends: int, scale: float) -> None:
     assert pz.PrandtlIshlinskii.from_dict(model.to_dict()) == model
 
 
-@settings(max_examples=30)
-@given(seed=st.integers(0, 10_000), scale=st.floats(0.1, 10.0))
-def test_turning_points_hold_all_the_memory_of_plays(seed: int, scale: float) -> None:
-    u = np.round(scale * np.cumsum(np.random.default_rng(seed).standard_normal(150)), 1)
+def assert_recalled(u: np.ndarray, thresholds: np.ndarray) -> None:
+    """The turning points of u give the plays, after every sample."""
     memory = Named(new(turning_points.TURNING_POINTS), turning_points.TURNING_POINTS)
-    thresholds = np.linspace(0.1, 8.0, 9)
-    y = np.zeros(9)
+    y = np.zeros(thresholds.size)
     for value in u.tolist():
         y = play(y, value, thresholds)
         turning_points.remember(memory, value)
         np.testing.assert_array_equal([turning_points.recall(memory, r) for r in thresholds], y)
 
 
+@settings(max_examples=30)
+@given(seed=st.integers(0, 10_000), scale=st.floats(0.1, 10.0))
+def test_turning_points_hold_all_the_memory_of_plays(seed: int, scale: float) -> None:
+    walk = np.cumsum(np.random.default_rng(seed).standard_normal(150))
+    assert_recalled(np.round(scale * walk, 1), np.linspace(0.1, 8.0, 9))
+
+
 def test_of_more_nested_loops_than_are_kept_the_smallest_are_forgotten() -> None:
-    memory = Named(new(turning_points.TURNING_POINTS))
-    thresholds = np.array([20.0, 30.0, 45.0])  # V: the loops that are forgotten move none of them
-    y = np.zeros(3)
-    for value in (60.0 * 0.97 ** np.arange(200) * (-1.0) ** np.arange(200)).tolist():
-        y = np.array([play(old, value, r) for old, r in zip(y, thresholds, strict=True)])
-        turning_points.remember(memory, value)
-        np.testing.assert_array_equal([turning_points.recall(memory, r) for r in thresholds], y)
-
-
-def line(*turns: float) -> Any:
-    parts = [np.linspace(a, b, 101)[1:] for a, b in itertools.pairwise(turns)]
-    return np.concatenate([[turns[0]], *parts])
-
-
-PREISACH = pz.PreisachStage(50_000.0).hysteresis
+    k = np.arange(200)
+    # None of the loops that are forgotten moves these plays.
+    assert_recalled(60.0 * 0.97**k * (-1.0) ** k, np.array([20.0, 30.0, 45.0]))
 
 
 def test_preisach_is_congruent() -> None:
     """Loops between the same turns are the same but for their level."""
-    assert isinstance(PREISACH, pz.Preisach)
-    up = PREISACH.simulate(line(0.0, 10.0, 20.0, 10.0, 20.0))[-201:]
-    down = PREISACH.simulate(line(0.0, 60.0, 10.0, 20.0, 10.0, 20.0))[-201:]
-    np.testing.assert_allclose(np.diff(up - down), 0.0, atol=1e-12)
+    model = pz.PreisachStage(50_000.0).hysteresis
+    assert isinstance(model, pz.Preisach)
+    loops = []
+    for turns in ([0.0, 10.0, 20.0, 10.0, 20.0], [0.0, 60.0, 10.0, 20.0, 10.0, 20.0]):
+        places = np.arange(100 * len(turns) - 99) / 100.0
+        loops.append(model.simulate(np.interp(places, np.arange(len(turns)), turns))[-201:])
+    np.testing.assert_allclose(np.diff(loops[0] - loops[1]), 0.0, atol=1e-12)

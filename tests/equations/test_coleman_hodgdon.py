@@ -1,4 +1,4 @@
-"""The Coleman-Hodgdon equations: identities of the paper, exact steps, the inverse."""
+"""The Coleman-Hodgdon equations: the exact solution, the inverse."""
 
 import itertools
 from typing import Any
@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 
 from piezoest import ColemanHodgdon
 from piezoest.equations import coleman_hodgdon as ch
-from tests.reference import TABLE_I
+from piezoest.equations import recent_path
+from piezoest.layout import Named, new
 
 
 @st.composite
@@ -29,29 +29,6 @@ def ramps(turning_points: list[float]) -> Any:
     return np.interp(np.arange(8 * len(points) - 7) / 8.0, np.arange(len(points)), points)
 
 
-@given(loops())
-def test_parameters_both_ways(loop: tuple[float, float, float]) -> None:
-    alpha, beta, gamma = ch.rate_parameters(*loop)
-    np.testing.assert_allclose(ch.loop_parameters(alpha, beta, gamma), loop, rtol=1e-12)
-
-
-@pytest.mark.parametrize("theta", TABLE_I)
-def test_exact_step_solves_the_differential_equation(theta: tuple[float, float, float]) -> None:
-    amplitude, omega = 40.0, 2.0 * np.pi * 5.0
-
-    def rate(t: float, w: Any) -> Any:
-        return ch.rate(w, amplitude * np.sin(omega * t), amplitude * omega * np.cos(omega * t), *theta)
-
-    # The turning points are steps of the record, so that u is monotone between samples.
-    times = np.linspace(0.0, 0.5, 2001)
-    w = [0.0]
-    for start, stop in itertools.pairwise(times):
-        solution = solve_ivp(rate, (start, stop), [w[-1]], method="DOP853", rtol=1e-13, atol=1e-15)
-        w.append(solution.y[0, -1])
-    simulated = ColemanHodgdon(*theta).simulate(amplitude * np.sin(omega * times))
-    np.testing.assert_allclose(simulated, w, atol=1e-9)
-
-
 def branch(u: float, u_0: float, w_0: float, alpha: float, beta: float, gamma: float) -> float:
     """w at voltage u on the branch through (u_0, w_0): (B5)-(B8), the exact solution of (1)."""
     asymptote = np.sign(u - u_0) * (alpha * beta - gamma) / alpha**2
@@ -60,12 +37,12 @@ def branch(u: float, u_0: float, w_0: float, alpha: float, beta: float, gamma: f
 
 
 @given(loops(), st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=6))
-def test_two_forms_agree(loop: tuple[float, float, float], turning_points: list[float]) -> None:
+def test_a_model_follows_the_exact_solution(loop: Any, turning_points: list[float]) -> None:
     theta = ch.rate_parameters(*loop)
-    u = ramps(turning_points)
-    w = 0.0
-    for k in range(1, u.size):
-        w = branch(u[k], u[k - 1], w, *theta)
+    np.testing.assert_allclose(ch.loop_parameters(*theta), loop, rtol=1e-12)
+    u, w = ramps(turning_points), 0.0
+    for before, now in itertools.pairwise(u):
+        w = branch(now, before, w, *theta)
     expected = ColemanHodgdon(*theta).simulate(u, allow_jumps=True)[-1]
     assert w == pytest.approx(expected, abs=1e-9 * (1.0 + abs(expected)))
 
@@ -79,8 +56,7 @@ def test_invert_undoes_simulate(loop: tuple[float, float, float], turning_points
     back = model.invert(x, initial_state=state, allow_jumps=True)
     # On the face c = 2b the slope dx/du vanishes at a turning point: what counts is x.
     again = model.simulate(back, initial_state=state, allow_jumps=True)
-    scale = 1.0 + np.max(np.abs(x))
-    np.testing.assert_allclose(again, x, atol=1e-9 * scale)
+    np.testing.assert_allclose(again, x, atol=1e-9 * (1.0 + np.max(np.abs(x))))
     if model.c > 2.2 * model.b:
         np.testing.assert_allclose(back, u, atol=1e-9 * 100.0)
 
@@ -106,3 +82,24 @@ def test_no_branch_error_at_extreme_arguments() -> None:
         assert np.isfinite(du)
         assert np.sign(du) == np.sign(dr)
     assert ch.inverse_increment(3.0, 0.0, 0.02, 0.06, 0.12) == 0.0
+
+
+@given(
+    st.lists(st.floats(-50.0, 50.0), min_size=1, max_size=recent_path.MOST - 1),
+    st.floats(1e-4, 0.5),
+    st.floats(-20.0, 20.0),
+)
+def test_the_recent_path_of_the_voltage_tells_where_a_model_would_stand(
+    turns: list[float], a: float, rest: float
+) -> None:
+    path = Named(new(recent_path.PATH), recent_path.PATH)
+    recent_path.begin(path, rest, 0.02)
+    h, last = 0.0, rest
+    u = np.interp(np.arange(1, 5 * len(turns) + 1) / 5, np.arange(len(turns) + 1), [0.0, *turns])
+    for value in u.tolist():
+        recent_path.follow(path, value)
+        h, last = ch.hysteresis_step(h, value - last, a, 1.0), value
+    recent_path.use_decay(path, a)
+    # A way back of a hundredth of a swing is no turn, and what is long gone is left out.
+    slack = 2.0 * recent_path.TURN * (np.ptp(u) + abs(rest)) * len(turns)
+    assert abs(recent_path.hysteresis(path) - h) <= slack + 3.0 * recent_path.FORGOTTEN / a

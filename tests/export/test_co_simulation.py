@@ -16,9 +16,7 @@ fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install pi
 fmi2 = pytest.importorskip("fmpy.fmi2")
 validation = pytest.importorskip("fmpy.validation")
 
-
 FS = 50_000.0
-LIMITS = pz.VoltageLimits(-60.0, 60.0)
 
 
 def pair(kind: str = "rls") -> tuple[Any, Any]:
@@ -26,12 +24,7 @@ def pair(kind: str = "rls") -> tuple[Any, Any]:
         return None, pz.LinearCompensator(pz.LinearGain(0.15), pz.VoltageLimits(sample_rate=FS))
     start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
     made = pz.HysteresisRLS if kind == "rls" else pz.HysteresisEKF
-    return made(FS, initial_model=start), pz.InverseCompensator(start, LIMITS)
-
-
-@pytest.fixture(scope="module")
-def unit(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return pz.export.fmu(*pair(), tmp_path_factory.mktemp("fmu") / "controller.fmu")
+    return made(FS, initial_model=start), pz.InverseCompensator(start, pz.VoltageLimits(-60.0, 60.0))
 
 
 @pytest.mark.parametrize(("kind", "precision"), [("rls", "double"), ("ekf", "float"), ("line", "double")])
@@ -54,14 +47,13 @@ def start(unit: Path, folder: Path) -> Any:
     return running
 
 
-def test_equals_the_library(unit: Path, tmp_path: Path) -> None:
+def test_equals_the_library(tmp_path: Path) -> None:
+    running = start(pz.export.fmu(*pair(), tmp_path / "controller.fmu"), tmp_path)
+    assert running.getReal([2]) == [0.0]
     r = pz.signals.triangle(5.0, 5.0, 1, FS).values[:6000]
     estimator, compensator = pair()
     record = pz.track(r, stage=pz.PaperStage(FS, seed=0), compensator=compensator, estimator=estimator)
-    running = start(unit, tmp_path)
-    assert running.getReal([2]) == [0.0]
-    u = np.empty(r.size)
-    x = np.nan
+    u, x = np.empty(r.size), np.nan
     for k in range(r.size):
         if k == 3000:
             saved = running.getFMUState()
@@ -87,17 +79,18 @@ def test_equals_the_library(unit: Path, tmp_path: Path) -> None:
     running.freeInstance()
 
 
-def test_wrong_arguments_are_refused(tmp_path: Path) -> None:
-    line = None, pz.LinearCompensator(pz.LinearGain(0.15))
-    arguments: Any
-    options: Any
-    for arguments, options, words in (
-        ((*pair(), tmp_path / "a.zip"), {}, r"\.fmu"),
-        ((*line, tmp_path / "a.fmu"), {}, "sample_rate"),
-        ((*pair(), tmp_path / "a.fmu"), {"sample_rate": 1e3}, "sample_rate"),
-    ):
-        with pytest.raises(ValueError, match=words):
-            pz.export.fmu(*arguments, **options)
+@pytest.mark.parametrize(
+    ("parts", "name", "options", "words"),
+    [
+        (pair(), "a.zip", {}, r"\.fmu"),
+        ((None, pz.LinearCompensator(pz.LinearGain(0.15))), "a.fmu", {}, "sample_rate"),
+        (pair(), "a.fmu", {"sample_rate": 1e3}, "sample_rate"),
+    ],
+)
+def test_wrong_arguments_are_refused(parts: Any, name: str, options: Any, words: str, tmp_path: Path) -> None:
+    estimator, compensator = parts
+    with pytest.raises(ValueError, match=words):
+        pz.export.fmu(estimator, compensator, tmp_path / name, **options)
 
 
 def test_a_full_disk_leaves_the_old_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

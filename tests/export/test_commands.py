@@ -10,7 +10,7 @@ import piezoest as pz
 from piezoest.cli import app
 from piezoest.records import write_columns
 
-MODEL = {"model": "ColemanHodgdon", "alpha": 0.02, "beta": 0.12, "gamma": 0.0036}
+START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
 
 
 def run(*arguments: object) -> Result:
@@ -29,25 +29,25 @@ def refused(result: Result, word: str) -> None:
 def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "model.json"
-    path.write_text(json.dumps(MODEL))
+    path.write_text(json.dumps({"model": "ColemanHodgdon", "alpha": 0.02, "beta": 0.12, "gamma": 0.0036}))
     return path
 
 
-@pytest.mark.parametrize("kind", ["none", "rls", "ekf"])
-def test_a_model_becomes_what_the_library_makes_of_it(model: Path, kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "made"), [("none", None), ("rls", pz.HysteresisRLS), ("ekf", pz.HysteresisEKF)]
+)
+def test_a_model_becomes_what_the_library_makes_of_it(model: Path, kind: str, made: type | None) -> None:
     own = ("--estimator", kind, "--sample-rate", 50_000, "--minimum", 0, "--maximum", 150)
     result = run("c", model, "-o", "out", *own, "--name", "stage", "--precision", "float")
     assert result.exit_code == 0, result.output
-    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
-    kinds: dict[str, type] = {"rls": pz.HysteresisRLS, "ekf": pz.HysteresisEKF}
-    estimator = kinds[kind](50_000.0, initial_model=start) if kind in kinds else None
-    compensator = pz.InverseCompensator(start, pz.VoltageLimits(0.0, 150.0, sample_rate=50_000.0))
+    estimator = made and made(50_000.0, initial_model=START)
+    compensator = pz.InverseCompensator(START, pz.VoltageLimits(0.0, 150.0, sample_rate=50_000.0))
     code = pz.export.c(estimator, compensator, name="stage", precision="float")
     assert Path("out/stage.c").read_text() == code.source
     plays = pz.PrandtlIshlinskii(0.1, [1.0, 5.0], [0.02, 0.03], creep=pz.Creep([0.01], [1.0]))
     model.write_text(json.dumps(plays.to_dict()))
     result = run("c", model, "-o", "out", *own)
-    if estimator is None:
+    if made is None:
         assert result.exit_code == 0
     else:
         refused(result, "Prandtl")
@@ -67,23 +67,25 @@ def test_an_adaptive_feedforward_needs_no_model(tmp_path: Path) -> None:
 
 def test_profile_is_the_same_as_the_objects(model: Path) -> None:
     estimator = pz.OutputErrorRLS(50_000.0)
-    limited = {"minimum": -10.0, "maximum": 100.0}
-    model.write_text(json.dumps({"model": MODEL, "estimator": estimator.to_dict(), "limits": limited}))
+    profile = {
+        "model": START.to_dict(),
+        "estimator": estimator.to_dict(),
+        "limits": {"minimum": -9, "maximum": 99},
+    }
+    model.write_text(json.dumps(profile))
     assert run("c", model, "-o", "out", "--name", "stage").exit_code == 0
-    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
-    limits = pz.VoltageLimits(-10.0, 100.0, sample_rate=50_000.0)
-    code = pz.export.c(estimator, pz.InverseCompensator(start, limits), name="stage")
+    limits = pz.VoltageLimits(-9.0, 99.0, sample_rate=50_000.0)
+    code = pz.export.c(estimator, pz.InverseCompensator(START, limits), name="stage")
     assert Path("out/stage.c").read_text() == code.source
 
 
-def test_a_saved_adaptive_feedforward_becomes_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_saved_adaptive_feedforward_becomes_code(model: Path) -> None:
     controller = pz.AdaptiveFeedforward(5000.0, limits=pz.VoltageLimits(-10.0, 10.0), estimators=())
-    Path("controller.json").write_text(json.dumps(controller.to_dict()))
-    assert run("c", "controller.json", "-o", "firmware").exit_code == 0
+    model.write_text(json.dumps(controller.to_dict()))
+    assert run("c", model, "-o", "firmware").exit_code == 0
     assert Path("firmware/piezoest_controller.c").read_text() == pz.export.c(controller).source
-    refused(run("c", "controller.json", "-o", "firmware", "--maximum", 3), "AdaptiveFeedforward")
-    refused(run("fmu", "controller.json", "-o", "x.fmu"), "AdaptiveFeedforward")
+    refused(run("c", model, "-o", "firmware", "--maximum", 3), "AdaptiveFeedforward")
+    refused(run("fmu", model, "-o", "x.fmu"), "AdaptiveFeedforward")
 
 
 def test_tables_are_written(model: Path) -> None:
@@ -95,14 +97,8 @@ def test_tables_are_written(model: Path) -> None:
     assert len(Path("out/branches.csv").read_text().splitlines()) == 1 + 2 * 33
 
 
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        (("c", "model.json", "-o", "out", "--estimator", "rls"), "--sample-rate"),
-        (("c", "model.json", "-o", "out", "--minimum", 5, "--maximum", 1), "minimum"),
-        (("fmu", "model.json", "-o", "out.fmu"), "sample_rate"),
-    ],
-)
-def test_mistakes_are_one_sentence(model: Path, arguments: tuple[object, ...], word: str) -> None:
-    refused(run(*arguments), word)
-    assert run("c", "model.json", "-o", "out", "--precision", "half").exit_code == 2
+def test_mistakes_are_one_sentence(model: Path) -> None:
+    refused(run("c", model, "-o", "out", "--estimator", "rls"), "--sample-rate")
+    refused(run("c", model, "-o", "out", "--minimum", 5, "--maximum", 1), "minimum")
+    refused(run("fmu", model, "-o", "out.fmu"), "sample_rate")
+    assert run("c", model, "-o", "out", "--precision", "half").exit_code == 2

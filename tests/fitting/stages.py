@@ -40,15 +40,5 @@ def noise(size: float, seed: int = 0, count: int = N) -> FloatArray:
     return size * np.random.default_rng([seed, 7]).standard_normal(count)
 
 
-def play_matrix(u: FloatArray, thresholds: FloatArray, states: FloatArray) -> FloatArray:
-    """Plays along a voltage (N, n), one sample after the other."""
-    rows = np.empty((u.size, thresholds.size))
-    y = states.copy()
-    for k in range(u.size):
-        y = np.clip(y, u[k] - thresholds, u[k] + thresholds)
-        rows[k] = y
-    return rows
-
-
 def rms(error: FloatArray) -> float:
     return float(np.sqrt(np.mean(error**2)))

@@ -11,11 +11,11 @@ import pytest
 import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.models import LearntModel, LearntOn
-from piezoest.signals.turns import turns
 
 FS = 5000.0
 LOOP = pz.ColemanHodgdon(0.02, 0.12, 0.0036, offset=3.0)
 KNOWN = LearntOn((-40.0, 40.0), (-6.0, 6.0), 800.0, (4.0, 6.0))
+STILL = LearntOn((0.0, 0.0), (0.0, 0.0), 0.0)
 
 
 def wave(amplitude: float = 40.0, frequency: float = 5.0, periods: int = 8) -> FloatArray:
@@ -23,26 +23,22 @@ def wave(amplitude: float = 40.0, frequency: float = 5.0, periods: int = 8) -> F
     return amplitude * np.interp(time * frequency % 1.0, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0.0])
 
 
-def test_turns_are_the_extremes_that_the_signal_runs_back_from() -> None:
-    u = wave(periods=2)
-    assert turns(u, 1.0).tolist() == [250, 750, 1250, 1750]
-    assert turns(u + 0.3 * np.sin(np.arange(u.size)), 1.0) == pytest.approx([250, 750, 1250, 1750], abs=8)
-    assert turns(u, 100.0).size == turns(np.ones(5), 0.0).size == turns([], 1.0).size == 0
-    # Of a flat one the first sample counts, where the signal came from does not.
-    assert turns([5.0, 0.0, 3.0, 3.0, 3.0, 0.0, 4.0], 1.0).tolist() == [1, 2, 5]
-
-
-def test_a_log_has_its_ranges_without_what_is_wild_or_missing() -> None:
+def test_a_log_has_its_ranges_without_what_is_wild_or_missing_and_so_have_its_blocks() -> None:
     u = np.concatenate((wave(20.0, 2.0), wave(40.0, 10.0)))
     x = 0.1 * u + 1.0
-    for _ in range(2):
-        found = LearntOn.of(u, x, FS)
-        assert found.voltage == (-40.0, 40.0)
-        assert found.displacement == pytest.approx((-3.0, 5.0), abs=0.05)
-        assert found.rate == pytest.approx(1600.0)
-        assert found.frequency == pytest.approx((2.0, 10.0), rel=0.01)
-        u[700], x[[100, 3000]] = np.nan, [1e6, -1e6]
-        u[1000:1100], x[2000:2010] = np.nan, np.nan
+    parts = [LearntOn.of(part, 0.1 * part + 1.0, FS) for part in np.split(u, 4)]
+    joined = parts[0].joined(parts[1]).joined(parts[2]).joined(parts[3])
+    for wild in (False, True):
+        if wild:
+            u[700], x[[100, 3000]] = np.nan, [1e6, -1e6]
+            u[1000:1100], x[2000:2010] = np.nan, np.nan
+        for found in (LearntOn.of(u, x, FS), joined):
+            assert found.voltage == (-40.0, 40.0)
+            assert found.displacement == pytest.approx((-3.0, 5.0), abs=0.05)
+            assert found.rate == pytest.approx(1600.0)
+            assert found.frequency == pytest.approx((2.0, 10.0), rel=0.01)
+    assert STILL.joined(KNOWN) == KNOWN.joined(STILL) == KNOWN
+    assert STILL.joined(STILL) == STILL
 
 
 def test_steps_spikes_rests_and_converters_are_no_rate() -> None:
@@ -53,20 +49,7 @@ def test_steps_spikes_rests_and_converters_are_no_rate() -> None:
     steps = 0.5 * np.round(u / 0.5)  # each of three samples or so
     for each in (stepped, spiked, np.concatenate((rest, u, rest)), steps):
         assert LearntOn.of(each, each, FS).rate == pytest.approx(800.0, rel=0.2)
-    assert LearntOn.of(rest, rest, FS) == LearntOn((0.0, 0.0), (0.0, 0.0), 0.0)
-
-
-def test_blocks_of_a_log_have_the_ranges_of_the_log() -> None:
-    u = np.concatenate((wave(20.0, 2.0), wave(40.0, 10.0)))
-    parts = [LearntOn.of(part, 0.1 * part, FS) for part in np.split(u, 4)]
-    joined = parts[0].joined(parts[1]).joined(parts[2]).joined(parts[3])
-    whole = LearntOn.of(u, 0.1 * u, FS)
-    assert joined.voltage == whole.voltage
-    assert joined.rate == pytest.approx(whole.rate)
-    assert joined.frequency == pytest.approx(whole.frequency, rel=0.01)
-    still = LearntOn((0.0, 0.0), (0.0, 0.0), 0.0)
-    assert still.joined(KNOWN) == KNOWN.joined(still) == KNOWN
-    assert still.joined(still) == still
+    assert LearntOn.of(rest, rest, FS) == STILL
 
 
 @pytest.mark.parametrize(
@@ -92,9 +75,9 @@ def test_who_leaves_a_range_is_told(used: LearntOn, count: int) -> None:
 def test_the_same_reference_again_leaves_nothing(kind: Any) -> None:
     """Though the inverse is steeper after a turn than on the way."""
     r = kind(5.0, 5.0, 4, FS).values
-    log = pz.InverseCompensator(LOOP).run(kind(5.0, 5.0, 4, FS).values + LOOP.offset)
-    known = LearntOn.of(kind(np.ptp(log) / 2.0, 5.0, 4, FS).values, r, FS)
-    assert known.left_by(LearntOn.of(log, r, FS)) == ()
+    u = pz.InverseCompensator(LOOP).run(r + LOOP.offset)
+    known = LearntOn.of(np.ptp(u) / 10.0 * r, r, FS)
+    assert known.left_by(LearntOn.of(u, r, FS)) == ()
 
 
 def test_a_model_comes_in_many_forms(tmp_path: Path) -> None:

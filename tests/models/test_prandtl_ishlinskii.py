@@ -12,6 +12,9 @@ from scipy.signal import cont2discrete
 from piezoest import Creep, MassSpringDamper, PrandtlIshlinskii
 from piezoest.equations.mechanics import mechanics_coefficients
 
+MODEL = PrandtlIshlinskii(0.1, [1.0, 4.0], [0.02, 0.03])
+CREEP, MECHANICS = Creep.logarithmic(0.01, shortest=0.01, longest=10.0), MassSpringDamper(780.0, 0.02)
+
 
 def test_initial_state_continues_a_record() -> None:
     u, y = 20.0 * np.sin(np.linspace(0.0, 9.0, 300)), np.zeros(2)
@@ -33,28 +36,19 @@ def test_vector_and_dictionary_forms() -> None:
         model.weights[0] = 1.0
 
 
-MODEL = PrandtlIshlinskii(0.1, [1.0, 4.0], [0.02, 0.03])
-CREEP, MECHANICS = Creep.logarithmic(0.01, shortest=0.01, longest=10.0), MassSpringDamper(780.0, 0.02)
-ONES = np.ones(5)
-
-
-def plays(*arguments: Any, **fields: Any) -> Any:
-    return lambda: PrandtlIshlinskii(*(arguments or (0.1, [1.0], [0.02])), **fields)
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (plays(0.1, [1.0, 2.0], [0.1]), "weights must have one value per threshold"),
-        (plays(0.1, [2.0, 1.0], [0.1, 0.1]), "thresholds must rise"),
-        (plays(np.nan, [1.0], [0.1]), "gain must be finite"),
-        (plays(bends=[1.0]), "bend_weights"),
-        (plays(creep=3.0), "creep"),
+        (lambda: PrandtlIshlinskii(0.1, [1.0, 2.0], [0.1]), "weights must have one value per threshold"),
+        (lambda: PrandtlIshlinskii(0.1, [2.0, 1.0], [0.1, 0.1]), "thresholds must rise"),
+        (lambda: PrandtlIshlinskii(np.nan, [1.0], [0.1]), "gain must be finite"),
+        (lambda: PrandtlIshlinskii(0.1, [1.0], [0.02], bends=[1.0]), "bend_weights"),
+        (lambda: PrandtlIshlinskii(0.1, [1.0], [0.02], creep=3.0), "creep"),  # type: ignore[arg-type]
         (lambda: PrandtlIshlinskii.from_theta([0.1, 1.0]), "1 \\+ 2n values"),
-        (lambda: MODEL.simulate(ONES, initial_state=np.array([0.0, 50.0])), "cannot be reached"),
+        (lambda: MODEL.simulate(np.ones(5), initial_state=np.array([0.0, 50.0])), "cannot be reached"),
         (lambda: Creep([0.1], [0.0]), "time_constants must be above zero"),
         (lambda: Creep.logarithmic(0.01, shortest=1.0, longest=0.1), "longest must be above"),
-        (lambda: CREEP.simulate(ONES, sample_rate=1e3, initial_state=np.zeros(3)), "initial_state must"),
+        (lambda: CREEP.simulate(np.ones(5), sample_rate=1e3, initial_state=np.zeros(3)), "initial_state"),
         (lambda: MassSpringDamper.from_dict({}), "mechanics has no 'natural_frequency'"),
     ],
 )
@@ -64,17 +58,17 @@ def test_refusals(call: Any, message: str) -> None:
 
 
 def test_creep() -> None:
-    creep = CREEP
-    np.testing.assert_allclose(creep.time_constants, [0.01, 0.1, 1.0, 10.0])
-    np.testing.assert_allclose(creep.gains, 0.01)
-    assert Creep.from_dict(json.loads(json.dumps(creep.to_dict()))) == creep
-    assert hash(Creep.from_dict(creep.to_dict())) == hash(creep)
-    x = creep.simulate(np.ones(100_000), sample_rate=1000.0)
+    np.testing.assert_allclose(CREEP.time_constants, [0.01, 0.1, 1.0, 10.0])
+    np.testing.assert_allclose(CREEP.gains, 0.01)
+    again = Creep.from_dict(json.loads(json.dumps(CREEP.to_dict())))
+    assert again == CREEP
+    assert hash(again) == hash(CREEP)
+    x = CREEP.simulate(np.ones(100_000), sample_rate=1000.0)
     # Of first-order terms: gains (1 - exp(-t/time constants)) after a step.
     t = np.arange(1.0, 1.0 + x.size)[:, None] / 1000.0
-    np.testing.assert_allclose(x, (1.0 - np.exp(-t / creep.time_constants)) @ creep.gains, atol=1e-12)
-    rest = creep.simulate(np.zeros(1), sample_rate=1000.0, initial_state=creep.gains)
-    assert rest[0] == pytest.approx(np.sum(creep.gains * creep.decays(1000.0)))
+    np.testing.assert_allclose(x, (1.0 - np.exp(-t / CREEP.time_constants)) @ CREEP.gains, atol=1e-12)
+    rest = CREEP.simulate(np.zeros(1), sample_rate=1000.0, initial_state=CREEP.gains)
+    assert rest[0] == pytest.approx(np.sum(CREEP.gains * CREEP.decays(1000.0)))
 
 
 def test_mechanics() -> None:

@@ -12,27 +12,19 @@ import piezoest as pz
 from piezoest.cli import app
 from piezoest.report import write_report
 
-TRUE = pz.ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)
-RATE = 2000.0
 
-
-@pytest.fixture(scope="module")
+@pytest.fixture
 def record() -> pz.Record:
-    time = np.arange(8000) / RATE
+    time = np.arange(8000) / 2000.0
     voltage = 20.0 * np.sin(2.0 * np.pi * 3.0 * time) * (1.0 + 0.3 * np.sin(2.0 * np.pi * 0.4 * time))
-    displacement = TRUE.simulate(voltage, allow_jumps=True)
+    displacement = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(voltage, allow_jumps=True)
     displacement += np.random.default_rng(0).normal(0.0, 2e-3, time.size)
     displacement[100:110] = np.nan
-    return pz.Record.from_arrays(voltage, displacement, RATE, "a <stage> & its log.csv")
-
-
-@pytest.fixture(scope="module")
-def found(record: pz.Record) -> pz.Identification:
-    return pz.identify(record, delay=0.0)
+    return pz.Record.from_arrays(voltage, displacement, 2000.0, "a <stage> & its log.csv")
 
 
 class Outline(HTMLParser):
-    """Tags that are opened, and those left open at the end."""
+    """Tags that are left open, and addresses."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -49,7 +41,8 @@ class Outline(HTMLParser):
         assert self.open.pop() == tag
 
 
-def test_page_is_sound_and_self_contained(found: pz.Identification, tmp_path: Path) -> None:
+def test_page_is_sound_and_self_contained(record: pz.Record, tmp_path: Path) -> None:
+    found = pz.identify(record, delay=0.0)
     write_report(found, tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     outline = Outline(text)
