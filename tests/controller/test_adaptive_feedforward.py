@@ -239,11 +239,12 @@ def test_calls_that_cannot_be_change_nothing(call: str, arguments: dict[str, Any
     assert same(driver, controller())
 
 
-def test_estimators_have_names_and_keep_their_arguments() -> None:
+def test_estimators_have_names_keep_their_arguments_and_are_made_for_a_gain_of_one() -> None:
     factories = (pz.HysteresisRLS, functools.partial(pz.HysteresisRLS, memory=0.4), pz.HysteresisEKF)
-    driver, own = controller(factories), ("HysteresisRLS", "HysteresisRLS 2", "HysteresisEKF")
-    assert [each.name for each in driver.candidates] == ["line", *own, team.DUHEM, team.RECORDED]
-    assert driver.to_dict()["estimators"][1]["arguments"]["memory"] == 0.4
+    made, own = team.made(factories, FS), ("HysteresisRLS", "HysteresisRLS 2", "HysteresisEKF")
+    assert team.names(made) == ("line", *own, team.DUHEM, team.RECORDED)
+    assert all(0.5 < each.model.line[0] < 2.0 for each in made)
+    assert made[1].to_dict()["arguments"]["memory"] == 0.4
     assert len(controller().candidates) == 1
 
 
