@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Iterable
 from contextlib import suppress
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from hypothesis import strategies as st
 
 import piezoest as pz
 from piezoest.bench.zoo import draw
+from piezoest.compensators import corridor
+from piezoest.layout import Named, new
 from piezoest.stage.instruments import Gauge
 
 FS = 50_000.0
@@ -233,3 +236,11 @@ def test_models_that_are_absurd_or_have_no_inverse_lead_the_corridor_nowhere(off
     u = handed_over(compensator, r, (pz.LinearGain(0.1, each) for each in offsets))
     assert np.abs(u).max() < 20.0
     assert compensator.state["corridor"]["soon"]
+
+
+def test_no_line_holds_the_voltage_at_a_limit() -> None:
+    state = Named(new(corridor.CORRIDOR), corridor.CORRIDOR)
+    state.soon, state.gain, state.half_swing = 1.0, 0.1, 5.0
+    state.centre, state.known = -40.0, corridor.ENOUGH
+    limits = SimpleNamespace(minimum=LIMITS.minimum, maximum=LIMITS.maximum)
+    assert corridor.kept(state, limits, 0.0, 0.0) < LIMITS.maximum - 10.0
