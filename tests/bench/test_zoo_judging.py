@@ -1,6 +1,7 @@
 """How runs of the zoo are judged: against a line, by names of faults, over maps, after a rest."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -8,20 +9,24 @@ from typing import Any
 import numpy as np
 import pytest
 
+import piezoest as pz
 from piezoest._checks import FloatArray
-from piezoest.bench.zoo import dwelling, play, settling
+from piezoest.bench.metrics import SETTLED
+from piezoest.bench.zoo import dwelling, play, settling, tasks
 from piezoest.bench.zoo.contenders import CANDIDATES, DEFAULT
 from piezoest.bench.zoo.contest import FLOOR, summarise_contest
-from piezoest.bench.zoo.dwelling import Dwell, dwell_rig, dwells, summarise_dwells
-from piezoest.bench.zoo.faults import FAULTS, truthful
+from piezoest.bench.zoo.dwelling import BEFORE, SHAPES, Dwell, dwell_rig, dwells, summarise_dwells
+from piezoest.bench.zoo.faults import ANY, FAULTS, truthful
 from piezoest.bench.zoo.judging import named, recovery
 from piezoest.bench.zoo.line import fit_line, run_learnt_line, run_line
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Traces
+from piezoest.bench.zoo.settling import SEGMENTS
+from piezoest.controller.faults import MEANINGS
 from piezoest.controller.shown import Event
 from tests.bench.shared import Line, bench, rig_with
 
-CHANGES = [name for name, _, _ in settling.SEGMENTS]
+CHANGES = [name for name, _, _ in SEGMENTS]
 
 
 def learnt(rig: Rig) -> tuple[Traces, int]:
@@ -34,7 +39,7 @@ def bend(run: Traces, part: slice) -> float:
     return float(np.max(np.abs(u - np.polyval(np.polyfit(r, u, 1), r))))
 
 
-@pytest.mark.parametrize("given", [{}, {"delay": 5, "block": 1}, {"limits": "0..150"}])
+@pytest.mark.parametrize("given", [{}, {"block": 1}, {"delay": 5, "block": 1}, {"limits": "0..150"}])
 def test_a_learnt_line_becomes_about_as_good_as_in_hindsight(given: dict[str, Any]) -> None:
     rig = rig_with(**{"amplitude": 5.0, **given})
     run, knows = learnt(rig)
@@ -95,6 +100,7 @@ def test_the_right_name_counts_and_how_soon() -> None:
     begins = {kind for kind, each in FAULTS.items() if "from-start" in each.modes}
     asked = {kind for kind in begins if rig_with(kind, "from-start").fault.names}
     assert asked == {"amplifier-frozen", "stage-stuck", "sensor-constant", "sensor-noise"}
+    assert {name for kind in FAULTS.values() for name in kind.names} == set(ANY) <= set(MEANINGS)
 
 
 def errors(rig: Rig, *cycles: float) -> FloatArray:
@@ -199,3 +205,53 @@ def test_the_command_plays_rests(tmp_path: Path) -> None:
     heads = (tmp_path / "dwell.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
     assert heads[:3] == ["key", "controller", "seed"]
     assert {"duration", "setpoint_noise", "feedback", "failure", *dwelling.PERIODS, "kept"} <= {*heads}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_inverse_without_error_settles_in_all_places(seed: int) -> None:
+    """Resonance and steps of the voltage leave room: what is asked for can be reached."""
+    for cell in settling.cells([seed], ["paper"]):
+        rig = settling.cell_rig(cell)
+        if not settling.asked(rig):
+            continue
+        straight = pz.LinearGain(rig.gain)
+        stage = replace(rig, model=straight).stage(healthy=True)
+        error = np.abs(rig.reference - stage.run(rig.reference / rig.gain)).reshape(-1, rig.plain.cycle)
+        first = 0
+        for _, factor, periods in SEGMENTS:
+            allowed = max(SETTLED * factor * cell.amplitude, settling.NOISES * rig.noise)
+            assert error[first + 1 : first + periods].max() < 0.6 * allowed, (cell, factor)
+            first += periods
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_it_rests_where_the_wave_is(seed: int) -> None:
+    rig, rest, drawn = dwell_rig(Dwell(seed, True, 2.0))
+    r, cycle = rig.reference, rig.plain.cycle
+    assert rest.stop - rest.start == round(2.0 * rig.sample_rate)
+    assert np.abs(r[rest] - r[rest.start - 1]).max() <= 6.0 * drawn["setpoint_noise"]
+    # Without the rest the wave goes on, and each period but the first is like the one before.
+    whole = np.concatenate((r[: rest.start], r[rest.stop :]))[rig.plain.begins :]
+    np.testing.assert_allclose(whole[2 * cycle :], whole[cycle:-cycle], atol=1e-9 * abs(r).max())
+    assert whole.size - (rest.start - rig.plain.begins) >= 3 * cycle
+    assert rest.start - rig.plain.begins >= BEFORE * cycle
+    assert rig.plain.kind in SHAPES
+    assert drawn["feedback"] > 0.0
+    assert dwell_rig(Dwell(seed, False, 2.0))[2]["feedback"] == 0.0
+
+
+def test_what_breaks_is_a_row() -> None:
+    (task,) = tasks.tasks("parts", [Dwell(3, True, 1.0)])
+    row, died = tasks.carry_out(task), tasks.died(task)
+    assert "unexpected keyword argument 'feedback'" in row["failure"]
+    assert died["failure"] == "the process died"
+    found = summarise_dwells([row, died])
+    assert found["failures"] == 2
+    assert found["groups"][0]["first"] is None
+
+
+def test_it_knows_nothing_of_what_is_still_to_come() -> None:
+    for kind in ("gain-step", "sensor-constant", "zero-off"):
+        rig = rig_with(kind, "permanent")
+        before = rig.fault.start
+        np.testing.assert_array_equal(learnt(rig)[0].voltage[:before], learnt(rig_with())[0].voltage[:before])

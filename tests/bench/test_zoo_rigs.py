@@ -16,7 +16,7 @@ from piezoest.bench.zoo.faults import FAULTS, START, TRANSIENT
 from piezoest.bench.zoo.logs import ADDED, SAMPLE_RATES, SAMPLES, Log
 from piezoest.bench.zoo.relays import Relays
 from piezoest.bench.zoo.rig import Rig
-from piezoest.bench.zoo.voltages import SHAPES
+from piezoest.bench.zoo.voltages import SHAPES, draw_voltage
 from piezoest.models import ColemanHodgdon
 from tests.bench import shared
 
@@ -284,3 +284,25 @@ def test_the_delay_is_what_the_log_says() -> None:
             errors.append(np.std((log.truth - x)[10:]))
         assert delays[np.argmin(errors)] == pytest.approx(log.added.get("delay", 0.0), abs=0.26)
         assert min(errors) < 2e-3 * log.stroke
+
+
+def test_of_too_many_loops_the_smallest_are_forgotten() -> None:
+    model = draw_family("relays", np.random.default_rng(6), REACH, width=0.2, gain=0.1)
+    turns = 60.0 * 0.97 ** np.arange(200) * (-1.0) ** np.arange(200)
+    x = model.simulate(np.concatenate((turns, [90.0, -20.0])))
+    assert np.abs(np.diff(x[150:200])).max() < 0.15  # near the middle, as the voltage is
+    np.testing.assert_allclose(x[-2:], model.simulate(np.array([90.0, -20.0])), atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_voltages_move_steadily_over_their_whole_range(kind: str) -> None:
+    for seed in range(10):
+        shape = draw_voltage(kind, 40_000, 20.0, np.random.default_rng(seed))
+        assert shape.shape == (40_000,)
+        assert (shape.min(), shape.max()) == pytest.approx((-1.0, 1.0))
+        # The fastest are the ramps of a staircase, in a 20th of a step.
+        assert np.abs(np.diff(shape)).max() < 0.05
+        # They turn in either half.
+        for half in np.split(shape, 2):
+            moves = np.sign(np.diff(half))
+            assert np.sum(np.abs(np.diff(moves[moves != 0.0])) > 0.0) >= 2

@@ -8,6 +8,7 @@ import pytest
 import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.controller import duhem, duhem_rls
+from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
 from piezoest.layout import MEASURED, Named, new, record
 from tests.controller.shared import DRIFTING, LIMITS, in_blocks, stands_along
 
@@ -125,3 +126,14 @@ def test_a_stage_that_drifts_to_its_loop_settles_in_the_third_period(amplitude: 
     _, x = in_blocks(pz.AdaptiveFeedforward(FS, limits=LIMITS), stage, r, 10)
     worst = np.abs(r - x).reshape(6, -1).max(axis=1) / amplitude
     assert worst[2:].max() < 0.012, worst
+
+
+def test_it_is_handed_over_when_it_has_learnt_something_and_goes_on_from_there() -> None:
+    model = Named(new(duhem.MODEL), duhem.MODEL)
+    u = triangle(4)
+    x = follows(BOTH, u)
+    state = learnt(u[:1], x[:1])
+    assert duhem_rls.write_model(state, None, model) == NO_MODEL
+    learnt(u[1:2000], x[1:2000], state)
+    assert duhem_rls.write_model(state, None, model) == TO_BE_PLACED
+    assert model.x == pytest.approx(x[1999], abs=0.02)

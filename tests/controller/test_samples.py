@@ -1,6 +1,7 @@
 """What `learn` is told: wrong, missing and saturated readings, voltages that were rounded or measured."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
+from piezoest.controller import levels
 from tests.controller import shared
 from tests.controller.shared import LIMITS, LOOP
 
@@ -205,3 +207,18 @@ def test_a_slew_rate_is_kept_where_a_sample_of_it_is_less_than_a_step() -> None:
     run = shared.drive(driver, stage, np.full(50_000, 4.0), told=rounded(10))
     assert np.abs(np.diff(run.u)).max() < limits.largest_step * (1.0 + 1e-9)
     assert abs(run.x[-1] - 4.0) < 0.05
+
+
+def test_a_reading_beyond_a_level_shows_that_it_is_none() -> None:
+    known = SimpleNamespace(rose=0.0, top=0.0, bottom=0.0, has_top=0.0, has_bottom=0.0, early=0.0)
+    levels.change(known, 0.0, 2.0)
+    levels.stand(known, 2.0, False)
+    levels.change(known, 2.0, -1.0)
+    levels.stand(known, -1.0, True)
+    assert levels.holds(known, 2.0)
+    assert levels.holds(known, -1.0)
+    assert not levels.holds(known, 0.5)
+    levels.change(known, -1.0, 2.5)
+    assert not levels.holds(known, 2.0)
+    assert levels.are_known(known)
+    assert known.early == 1.0

@@ -171,3 +171,26 @@ def test_hop_bounds_the_number_of_fits() -> None:
     for k in range(u.size):
         steps.step(u[k], x[k])
     np.testing.assert_array_equal(steps.theta, estimator.theta)
+
+
+def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
+    """Of alpha, beta and gamma, the start state unknown: sensitivities by finite differences."""
+    u, _ = record()
+    point, steps = np.array([*TRUE.theta, 0.0]), np.array([1e-7, 1e-7, 1e-9, 1e-5])
+
+    def simulated(p: Any) -> Any:
+        return pz.ColemanHodgdon(*p[:3]).simulate(u, initial_state=p[3])
+
+    J = np.array([(simulated(point + h) - simulated(point - h)) / (2.0 * h.sum()) for h in np.diag(steps)]).T
+    scale = np.linalg.norm(J, axis=0)
+    bound = (NOISE**2 * np.linalg.inv((J / scale).T @ (J / scale)) / np.outer(scale, scale))[:3, :3]
+    fits = [pz.BatchFit(RATE).fit(*record(seed=seed)) for seed in range(60)]
+    errors = np.array([fit.theta[:3] - TRUE.theta for fit in fits])
+    together = np.mean(np.einsum("ki,ij,kj->k", errors, np.linalg.inv(bound), errors)) / 3.0
+    assert 0.9 < np.sqrt(together) < 1.1
+    # What the fit says of itself is the bound too.
+    said = np.mean([fit.P[:3, :3] for fit in fits], axis=0)
+    np.testing.assert_allclose(said / bound, 1.0, rtol=0.05)
+    inside = np.abs(errors) < 3.0 * np.array([fit.standard_errors[:3] for fit in fits])
+    assert np.all(inside, axis=1).mean() >= 0.95
+    assert np.mean([fit.noise for fit in fits]) == pytest.approx(NOISE, rel=0.01)

@@ -171,7 +171,12 @@ def test_the_duhem_model_learns_in_single_precision_too() -> None:
 
 @pytest.mark.parametrize(
     ("name", "precision", "cc"),
-    [("line", "double", "gcc"), ("default", "double", "clang"), ("default", "float", "gcc")],
+    [
+        ("line", "double", "gcc"),
+        ("default", "double", "clang"),
+        ("default", "float", "gcc"),
+        ("ekf", "float", "gcc"),
+    ],
 )
 @pytest.mark.slow
 def test_compiles_without_a_warning(name: str, precision: Any, cc: str, tmp_path: Path) -> None:

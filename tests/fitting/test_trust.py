@@ -152,3 +152,24 @@ def test_an_interval_holds_creep_that_the_record_could_not_show() -> None:
     plain = found.spread._replace(by_stay=0.0).along(u, later)
     assert np.mean((np.abs(x - p.x) <= plain)[N:]) < 0.8
     np.testing.assert_allclose((p.upper - p.x)[: N + 1000], plain[: N + 1000], rtol=0.01)
+
+
+@pytest.mark.slow
+def test_standard_errors_of_plays_and_creep_are_of_the_size_of_their_scatter() -> None:
+    """Of a stage whose thresholds and time constants are those of the fit."""
+    u = voltage(np.random.default_rng(1), centre=40.0)
+    thresholds = 0.45 * np.ptp(u) * np.arange(1, 20) / 19.0
+    creep = pz.Creep([0.05], [0.5])
+    model = pz.PrandtlIshlinskii(0.1, thresholds, np.full(19, 4e-3), creep=creep, sample_rate=RATE)
+    state = np.clip(0.0, u[0] - thresholds, u[0] + thresholds)
+    x = model.simulate(u, initial_state=np.append(state, 0.0))
+    found: list[Any] = []
+    for seed in range(10):
+        fit: Any = pz.fit(u, x + noise(5e-3, seed), sample_rate=RATE, model="plays-creep")
+        if fit.model.creep is not None and fit.model.creep.gains.size == 1:
+            found.append(fit)
+    assert len(found) >= 3
+    for name, values in {"gain": [fit.model.gain for fit in found],
+                         "creep.gains[0]": [fit.model.creep.gains[0] for fit in found]}.items():  # fmt: skip
+        stated = float(np.median([fit.standard_errors[name] for fit in found]))
+        assert 0.3 < stated / np.std(values) < 4.0
