@@ -124,10 +124,15 @@ def cold_start(document: Document) -> str:
 def replacements(prefix: str, values: dict[str, Any], document: Document | None = None) -> str:
     """Substitutions for numbers that stand in sentences; with a document, when and where it was made, too."""
     if document is not None:
-        date, changed = document["date"][:10], ", ".join(document["changed"])
-        since = f" (since then the code of {changed} has changed)" if changed else ""
-        values = {"date": date + since, "machine": machine_of(document), **values}
+        date = document["date"][:10] + since(document)
+        values = {"date": date, "machine": machine_of(document), **values}
     return "".join(f".. |{prefix} {name}| replace:: {value}\n" for name, value in values.items())
+
+
+def since(document: Document) -> str:
+    """Which code has changed since a document was made, for a sentence; nothing if none has."""
+    changed = ", ".join(document["changed"])
+    return f" (since then the code of {changed} has changed)" if changed else ""
 
 
 def percent(share: float | None) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import typer
-from page_parts import DOCS, NEEDS, UNSETTLED, cold_start, part_of, read, speed_table
+from page_parts import DOCS, NEEDS, UNSETTLED, cold_start, part_of, read, since, speed_table
 
 import piezoest as pz
 from piezoest._files import save_figure, write_text
@@ -26,25 +26,25 @@ The first table names the best estimator over {stages} simulated stages. Its err
 stage of the paper, in % of the amplitude. The first three rows give the geometric mean of the largest errors
 of all periods after the change. *A small first error* and *Long rests* give the largest error of the first
 period, the other rows the settled error. The simulated stage of the paper is a sum of plays (elements with
-backlash), as is the model of PrandtlIshlinskiiRLS. So this estimator is better on it in most rows. Real
-stages are not sums of plays.
+backlash), as is the model of PrandtlIshlinskiiRLS. So in some rows the error of this estimator is smaller
+than the one in the table. Real stages are not sums of plays.
 
-The second table is of the same stage. *Settles*: periods after a change until every further error is below
+The second table is for the same stage; its errors are in % of the amplitude, too. *Settles*: periods after a change until every further error is below
 {level:g} %, and the share of runs that settle; *others settle*: this share on the other stages, in the
 scenarios that repeat. *First*: largest error in the first period after the change. This is a mean over the
 kinds of change: after a cold start it is {cold} % for AdaptiveFeedforward. *Settled*: largest error in the
 last half of the periods. *Step*: one sample, called from Python; for AdaptiveFeedforward one `step` and one
 `learn`.
-Geometric means over the scenarios of the medians over {seeds} seeds, {slow} for the slow estimators;
-{machine}, {date}. A dash: {dash}
+Each number is the median over {seeds} seeds ({slow} for the slow estimators), then the geometric mean over the
+scenarios. Measured on {machine} on {date}{since}. A dash: {dash}
 
 With a resonance, late readings or backlash the error on your rig is larger, and it takes longer to settle. On
 {rigs} simulated rigs drawn at random, half of them with a fault, the voltage never left its limits. On
 {share:.0f} % of them the error was at some time clearly larger than that of a straight line, and on
 {end:.1f} % at the end. See *Safety on unknown rigs* in the documentation.
 
-The paper measured {linear_theirs:g} µm with linear feed-forward and {theirs:g} µm with compensation;
-its procedure gives {linear_ours:.2g} µm and {ours:.2g} µm here. On a recording of a real stage that
+The paper measured a largest error of {linear_theirs:g} µm with linear feed-forward and {theirs:g} µm with
+compensation. The same procedure gives {linear_ours:.2g} µm and {ours:.2g} µm on the simulated stage. On a recording of a real stage that
 moves by {stroke:.0f} µm, the error of the identified model is {missed:.2f} µm rms on the half that it has
 not seen, and that of a straight line {line:.2f} µm.
 """
@@ -68,6 +68,7 @@ def figures() -> str:
         "stages": len(runs["plan"]["stages"]),
         "machine": runs["machine"]["cpu"],
         "date": runs["date"][:10],
+        "since": since(runs),
         "rigs": rigs["runs"],
         "share": 100.0 * rigs["violations"]["ratio"] / rigs["runs"],
         "end": 100.0 * rigs["violations"]["last_ratio"] / rigs["runs"],
