@@ -6,7 +6,12 @@ from typing import NamedTuple
 
 from piezoest.records.stamps import is_stamp
 
-WORDS = ("nan", "-", "--", "na", "n/a", "#n/a", "null", "none", "missing")
+# The last ones are errors of spreadsheets and of C on Windows.
+WORDS = (
+    "nan", "-", "--", "---", "na", "n/a", "n.a.", "<na>", "nat", "?", "null", "none", "missing", "-nan",
+    "#n/a", "#na", "#nv", "#div/0!", "#value!", "#wert!", "#ref!", "#bezug!", "#num!", "#zahl!", "#null!",
+    "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "1.#inf", "-1.#inf", "nan(ind)", "-nan(ind)",
+)  # fmt: skip
 MISSING = sorted({"", *WORDS, *map(str.upper, WORDS), *map(str.capitalize, WORDS), "NaN"})
 # Groups of three never begin with zero, so 0.005 holds none.
 GROUPS = r"[-+]?[1-9]\d{{0,2}}(?:{0}\d{{3}})+"

@@ -2,6 +2,7 @@
 
 import math
 import re
+import unicodedata
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -25,12 +26,15 @@ NAMES = {
 UNITS = {
     "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0,
              "msec": 1e-3, "usec": 1e-6, "h": 3600.0, "hr": 3600.0, "second": 1.0, "seconds": 1.0,
-             "milliseconds": 1e-3, "microseconds": 1e-6, "minutes": 60.0, "hours": 3600.0, "days": 86_400.0},
-    "voltage": {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "kv": 1e3, "millivolts": 1e-3},
+             "milliseconds": 1e-3, "microseconds": 1e-6, "minutes": 60.0, "hours": 3600.0, "days": 86_400.0,
+             "nanoseconds": 1e-9},
+    "voltage": {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "kv": 1e3, "millivolts": 1e-3,
+                "microvolts": 1e-6, "kilovolts": 1e3},
     "displacement": {"um": 1.0, "micron": 1.0, "microns": 1.0, "nm": 1e-3, "pm": 1e-6, "mm": 1e3, "m": 1e6,
                      "micrometer": 1.0, "micrometers": 1.0, "micrometre": 1.0, "micrometres": 1.0,
                      "nanometers": 1e-3, "nanometres": 1e-3, "millimeters": 1e3, "millimetres": 1e3,
-                     "angstrom": 1e-4, "angstroms": 1e-4},
+                     "angstrom": 1e-4, "angstroms": 1e-4, "cm": 1e4, "centimeters": 1e4, "centimetres": 1e4,
+                     "meter": 1e6, "meters": 1e6, "metre": 1e6, "metres": 1e6},
 }  # fmt: skip
 UNITS["reference"] = UNITS["displacement"]
 BASE_UNITS = {"time": "s", "voltage": "V", "displacement": "µm", "reference": "µm"}
@@ -78,8 +82,14 @@ def choose(
         elif source.titles or named:
             index = _guess(source, quantity)
         else:
-            # Without a column of time wanted, a first of three columns is still time.
-            index = i + (source.width - len(wanted) if source.width == 3 and "time" not in wanted else 0)
+            # Without a column of time wanted, one column more is still time.
+            more = 0 if "time" in wanted else source.width - len(wanted)
+            if more > 1:
+                raise LogError(
+                    f"{source.path}: {counted(source.width, 'column')} without a header: "
+                    f"name {' and '.join(wanted)} by their numbers"
+                )
+            index = i + more
         title = source.titles[index] if source.titles else str(index + 1)
         taken = (1.0, "") if not source.titles and not named else None
         factor = stated.get(quantity) or taken or _factor(source, title, quantity)
@@ -157,13 +167,14 @@ def _listed(source: Source) -> str:
 
 def split_unit(title: str) -> tuple[str, str]:
     """Split ``drive_mV``, ``pos [nm]``, ``t (ms)``, ``x/µm`` into name and unit in lower case."""
-    plain = with_u(title.strip())
+    # MATLAB and R write brackets as _ and dots.
+    plain = with_u(unicodedata.normalize("NFKC", title).strip().rstrip("_."))
     match = re.fullmatch(r"(.+?)\s*(?:[\[({<](\w+)[\])}>]|[/_\s.]\s*([^\W_]+))", plain)
     if match is None:
         return plain, ""
     unit = next(group for group in match.groups()[1:] if group).lower()
     if any(unit in units for units in UNITS.values()):
-        return match[1].replace("_", " ").strip(), unit
+        return match[1].replace("_", " ").strip(" ."), unit
     return plain.replace("_", " "), ""
 
 
@@ -197,12 +208,32 @@ def titled(name: str, unit: str) -> str:
 
 
 def with_units(names: list[str], below: list[str]) -> list[str]:
-    """Names with the units of the line below them; no names if that line holds anything else."""
+    """Names with the units of the line below them; no names if that line holds anything else.
+
+    Beside the units of two quantities there may be others, of columns that no log needs: N, °C, %.
+    """
     units = [cell.strip(" []()") for cell in below]
-    known = {unit for units in UNITS.values() for unit in units}
-    if not any(units) or not all(unit == "" or with_u(unit).lower() in known for unit in units):
+    if len(names) != len(units) or not any(units):
         return []
-    return [titled(*named) for named in zip(names, units, strict=True)] if len(names) == len(units) else []
+    of = [_of_unit(unit) for unit in units]
+    two = len(set(of) - {None, ""}) > 1
+    found = []
+    for name, unit, quantity in zip(names, units, of, strict=True):
+        if quantity is None and not (two and _is_other_unit(unit) and _quantity(name) is None):
+            return []
+        found.append(titled(name, unit if quantity else ""))
+    return found
+
+
+def _is_other_unit(text: str) -> bool:
+    """Whether a text may be a unit of something else: short, without digits, and no name of a column."""
+    return len(text) <= 3 and re.search(r"\d", text) is None and _quantity(text) is None
+
+
+def _of_unit(unit: str) -> str | None:
+    """Quantity that a unit is of; empty for no unit, None for an unknown one."""
+    plain = with_u(unit).lower()
+    return next((quantity for quantity in NAMES if plain in UNITS[quantity]), None) if plain else ""
 
 
 def with_u(text: str) -> str:

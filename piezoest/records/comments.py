@@ -7,6 +7,8 @@ from piezoest.records.columns import UNITS, with_u
 from piezoest.records.source import RATES, stated_rate
 
 COMMENTS = ("#", "%")
+# The beginning of a comment, but not of a row that begins with an error of a spreadsheet.
+COMMENT = r"(?!#(?:N/?A|NV|DIV/0!|VALUE!|WERT!|REF!|BEZUG!|NUM!|ZAHL!|NULL!))[#%]"
 # A line ``sample rate [kHz]: 10`` or ``SAMPLE_TIME = 5e-05``, with the unit beside the name or the number.
 ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.\deE]+)\s*(\w*)\s*")
 PERIODS = (
@@ -19,6 +21,11 @@ OF_PERIODS = {"": 1.0, **UNITS["time"]}
 NUMBERED_NAME = re.compile(r"\s*NAME(\d+)\s*=\s*(\S.*?)\s*")
 
 
+def is_comment(line: str) -> bool:
+    """Whether a line is a comment."""
+    return re.match(COMMENT, line.lstrip()) is not None
+
+
 def bare(comment: str) -> str:
     """Comment without its sign and without quotation marks, which need not be closed there."""
     return comment.lstrip().lstrip("".join(COMMENTS)).replace('"', "")
@@ -26,8 +33,19 @@ def bare(comment: str) -> str:
 
 def entries_in(lines: list[list[str]]) -> list[str]:
     """Entries in the cells of lines: one in a cell, or with the number in the cell behind it or below."""
-    found = [cell for line in lines for cell in line]
-    found += [f"{line[0]} = {line[1]}" for line in lines if len(line) > 1]
+    # A number that was cut at its comma, as 50,000 is, states nothing.
+    ends = [[*(cell[:1].isdigit() for cell in line[1:]), False] for line in lines]
+    found = [
+        cell
+        for line, cut in zip(lines, ends, strict=True)
+        for cell, no in zip(line, cut, strict=True)
+        if not no
+    ]
+    found += [
+        f"{line[0]} = {line[1]}"
+        for line in lines
+        if len(line) > 1 and not (len(line) > 2 and re.match(r"\d{3}\b", line[2]))
+    ]
     for upper, lower in itertools.pairwise(lines):
         found += [f"{name} = {value}" for name, value in zip(upper, lower, strict=False)]
     return found

@@ -119,7 +119,8 @@ def open_sheet(path: Path) -> Frame:
         )
     for sheet in sheets.values():
         sheet = sheet.mask(sheet.map(lambda cell: is_missing(str(cell))))
-        numeric = np.flatnonzero((_are_numbers(sheet) & sheet.notna()).sum(axis=1) > 1)
+        numbers, cells = (_are_numbers(sheet) & sheet.notna()).sum(axis=1), sheet.notna().sum(axis=1)
+        numeric = np.flatnonzero(numbers > 1)
         if numeric.size:
             break
     else:
@@ -127,6 +128,9 @@ def open_sheet(path: Path) -> Frame:
             f"{path}: no sheet has a table of numbers in it; there are {', '.join(map(shown, sheets))}"
         )
     begins = int(numeric[0])
+    while begins > 0 and numbers[begins - 1] == cells[begins - 1] > 0:
+        # A sample of which only one cell is not missing.
+        begins -= 1
     table = sheet.iloc[begins:].dropna(axis=1, how="all")
     table = table.loc[: table.last_valid_index()]
     above = sheet.iloc[:begins][table.columns].dropna(how="all")

@@ -14,7 +14,7 @@ from typing import Any, BinaryIO, NamedTuple, cast
 
 import numpy as np
 
-from piezoest.records.comments import COMMENTS
+from piezoest.records.comments import COMMENT, is_comment
 from piezoest.records.source import LogError, check_size
 
 # Bytes for recognising the encoding.
@@ -32,7 +32,7 @@ UTF_32 = (b"\xff\xfe\0\0", b"\0\0\xfe\xff")
 UNMARKED = {"utf-16-le": 1, "utf-16-be": 0}  # and which byte of two is zero in Latin letters
 PACKED = b"\x1f\x8b"
 # A line that is blank or a comment, in a text that begins with the end of a line.
-SPECIAL = re.compile(r"\n[^\S\n]*(?:[#%]|\n|\Z)")
+SPECIAL = re.compile(rf"\n[^\S\n]*(?:{COMMENT}|\n|\Z)")
 
 
 class Lines(NamedTuple):
@@ -92,7 +92,8 @@ def encoding_of(path: Path) -> str:
         # Nearly all letters and digits have a zero beside them.
         if raw[zeros::2].count(0) > 0.9 * len(raw) / 2 and CONTROL.isdisjoint(raw[1 - zeros :: 2]):
             return encoding
-    if CONTROL.intersection(raw[:4096]):
+    # What a computer had not yet written when it lost its power is zero.
+    if CONTROL.intersection(raw[:4096].rstrip(b"\0") or raw[:4096]):
         raise LogError(
             f"{path}: this is not a text file: save the log as CSV, or name it by its format "
             "(.mat, .h5, .parquet, .tdms, .xlsx, .npy, .npz)"
@@ -134,7 +135,7 @@ def sample_lines(path: Path, encoding: str, begins: int, skip_blank: bool, rows:
             continue
         kept: list[tuple[int, str]] = []
         for number, line in enumerate(text.split("\n"), first):
-            if number < begins or line.lstrip().startswith(COMMENTS):
+            if number < begins or is_comment(line):
                 continue
             if line.strip():
                 kept += [*blank, (number, line)]

@@ -16,7 +16,7 @@ from piezoest._checks import FloatArray
 from piezoest.records import scopes
 from piezoest.records.cells import MISSING, Marks, Style, is_missing, is_number, number, style_of
 from piezoest.records.columns import names_columns, titled, with_units
-from piezoest.records.comments import COMMENTS, bare, entries_in, numbered_names, rate_in
+from piezoest.records.comments import bare, entries_in, is_comment, numbered_names, rate_in
 from piezoest.records.lines import (
     LONGEST_FOOTER,
     Lines,
@@ -66,7 +66,7 @@ def layout_of(path: Path) -> Layout:
     head: list[Numbered] = []
     comments: list[Numbered] = []
     for place, line in itertools.islice(lines, HEAD_LINES):
-        (comments if line.lstrip().startswith(COMMENTS) else head).append((place, line))
+        (comments if is_comment(line) else head).append((place, line))
     filled = [(place, line) for place, line in head if line.strip()]
     if not filled:
         raise LogError(f"{path}: the file is empty")
@@ -118,8 +118,11 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
     like_first &= begins < 2 or names_columns(first) or not names_columns(head[begins - 1])
     if begins < 2 or like_first or len(head) < min(len(filled), LONGEST_PREAMBLE):
         header, begins = ([], 0) if _numeric(first) else (first, 1)
-        if header and len(head) > 1 and len(header) != len(head[1]):
-            header = _titles(path, filled[0][1], mark, len(head[1]))
+        if header and len(head) > 1:
+            # Numbers with decimal commas may be parted by blanks.
+            second = split(path, [filled[1][1]], mark)[0] if mark == " " else head[1]
+            if len(header) != len(second):
+                header = _titles(path, filled[0][1], mark, len(second))
         if header and len(head) > 2 and (named := with_units(header, head[1])):
             header, begins = named, 2
         return mark, header, filled[begins:]
@@ -132,18 +135,18 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
 
 
 def _named_in_comments(path: Path, comments: list[str], row: str, delimiter: str) -> list[str]:
-    """Names of columns: one a comment, or all in the last one, or in the last but one with units below.
-
-    NumPy's savetxt writes them in the last.
-    """
+    """Names of columns: one a comment, or all in the last one that has names, perhaps with units below."""
     width = len(split(path, [row], delimiter)[0])
     if len(numbered := numbered_names(comments)) == width:
         return numbered
-    above = [_titles(path, bare(line), delimiter, width) for line in comments[-2:]]
-    names = above[-1] if above else []
-    if len(above) > 1 and (named := with_units(above[0], names)):
-        names = named
-    return names if len(names) == width and names_columns(names) else []
+    below: list[str] = []
+    for line in reversed(comments):
+        names = _titles(path, bare(line), delimiter, width)
+        for found in (with_units(names, below), names):
+            if len(found) == width and names_columns(found):
+                return found
+        below = names
+    return []
 
 
 def _titles(path: Path, line: str, delimiter: str, width: int) -> list[str]:
