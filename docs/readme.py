@@ -30,8 +30,8 @@ backlash), as is the model of PrandtlIshlinskiiRLS. So in some rows the error of
 than the one in the table. Real stages are not sums of plays.
 
 The second table is for the same stage; its errors are in % of the amplitude, too.
-*Settles*: periods after a change until every further error is below {level:g} %, and the share of runs that settle; *others settle*: this share on the other stages, in the
-scenarios that repeat. *First*: largest error in the first period after the change. This is a mean over the
+*Settles*: periods after a change until every further error is below {level:g} %, and the
+share of runs that settle; *others settle*: this share on the other stages, in the scenarios that repeat. *First*: largest error in the first period after the change. This is a mean over the
 kinds of change: after a cold start it is {cold} % for AdaptiveFeedforward. *Settled*: largest error in the
 last half of the periods. *Step*: one sample, called from Python; for AdaptiveFeedforward one `step` and one
 `learn`.
