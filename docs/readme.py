@@ -29,14 +29,14 @@ period, the other rows the settled error. The simulated stage of the paper is a 
 backlash), as is the model of PrandtlIshlinskiiRLS. So in some rows the error of this estimator is smaller
 than the one in the table. Real stages are not sums of plays.
 
-The second table is for the same stage; its errors are in % of the amplitude, too.
-*Settles*: periods after a change until every further error is below {level:g} %, and the
-share of runs that settle; *others settle*: this share on the other stages, in the scenarios that repeat. *First*: largest error in the first period after the change. This is a mean over the
-kinds of change: after a cold start it is {cold} % for AdaptiveFeedforward. *Settled*: largest error in the
-last half of the periods. *Step*: one sample, called from Python; for AdaptiveFeedforward one `step` and one
-`learn`.
-Each number is the median over {seeds} seeds ({slow} for the slow estimators), then the geometric mean over
-the scenarios. Measured on {machine} on {date}{since}. A dash: {dash}
+The second table is for the same stage; its errors are in % of the amplitude, too. *Settles*: periods
+after a change until every further error is below {level:g} %, and the share of runs that settle; *others
+settle*: this share on the other stages, in the scenarios that repeat. *First*: largest error in the first
+period after the change. This is a mean over the kinds of change: after a cold start it is {cold} % for
+AdaptiveFeedforward. *Settled*: largest error in the last half of the periods. *Step*: one sample, called
+from Python; for AdaptiveFeedforward one `step` and one `learn`. Each number is the median over {seeds}
+seeds ({slow} for the slow estimators), then the geometric mean over the scenarios. Measured on {machine}
+on {date}{since}. A dash: {dash}
 
 With a resonance, late readings or backlash the error on your rig is larger, and it takes longer to settle. On
 {rigs} simulated rigs drawn at random, half of them with a fault, the voltage never left its limits. On
