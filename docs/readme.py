@@ -44,10 +44,9 @@ With a resonance, late readings or backlash the error on your rig is larger, and
 {end:.1f} % at the end. See *Safety on unknown rigs* in the documentation.
 
 The paper measured a largest error of {linear_theirs:g} µm with linear feed-forward and {theirs:g} µm with
-compensation. The same procedure gives {linear_ours:.2g} µm and {ours:.2g} µm on the simulated stage.
-On a recording of a real stage that
-moves by {stroke:.0f} µm, the error of the identified model is {missed:.2f} µm rms on the half that it has
-not seen, and that of a straight line {line:.2f} µm.
+compensation. The same procedure gives {linear_ours:.2g} µm and {ours:.2g} µm on the simulated stage. On a
+recording of a real stage that moves by {stroke:.0f} µm, the error of the identified model is {missed:.2f}
+µm rms on the half that it has not seen, and that of a straight line {line:.2f} µm.
 """
 
 

@@ -54,10 +54,20 @@ def test_a_row_that_begins_with_an_error_of_a_spreadsheet_is_no_comment(tmp_path
     lines = [f"{u:.1f},{x:.3f}" for _, u, x in ROWS]
     lines[20], lines[21] = "#N/A,4.6", "51.0,#DIV/0!"
     path = tmp_path / "log.csv"
-    path.write_text("\n".join(["voltage_V,displacement_um", *lines]), encoding="utf-8")
+    comments = ["#NAME0 = Voltage", "#NA = 0.5", "#NVALUES 60"]
+    path.write_text("\n".join([*comments, "voltage_V,displacement_um", *lines]), encoding="utf-8")
     record = read_record(path, sample_rate=1000.0)
     assert len(record) == len(ROWS)
     assert np.isnan([record.voltage[20], record.displacement[21]]).all()
+
+
+def test_a_rate_beside_other_numbers_is_taken(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = "\n".join(f"{u:.1f},{x:.3f}" for _, u, x in ROWS)
+    path.write_text(
+        f"Scope 12\nSample rate: 10 kHz, 2 channels\nvoltage_V,displacement_um\n{rows}", encoding="utf-8"
+    )
+    assert read_record(path).sample_rate == 10e3
 
 
 @pytest.mark.parametrize("stated", ["Sample rate: 50,000 Hz", "Sample rate,1,000"])

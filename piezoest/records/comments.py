@@ -3,12 +3,14 @@
 import itertools
 import re
 
+from piezoest.records.cells import WORDS
 from piezoest.records.columns import UNITS, with_u
 from piezoest.records.source import RATES, stated_rate
 
 COMMENTS = ("#", "%")
-# The beginning of a comment, but not of a row that begins with an error of a spreadsheet.
-COMMENT = r"(?!#(?:N/?A|NV|DIV/0!|VALUE!|WERT!|REF!|BEZUG!|NUM!|ZAHL!|NULL!))[#%]"
+# The beginning of a comment, but not of a row whose first cell is an error of a spreadsheet.
+ERRORS = "|".join(re.escape(word) for word in WORDS if word.startswith(COMMENTS))
+COMMENT = rf"(?!(?i:{ERRORS})[^\S\n]*(?:[-+.,;|\d\n]|\Z))[#%]"
 # A line ``sample rate [kHz]: 10`` or ``SAMPLE_TIME = 5e-05``, with the unit beside the name or the number.
 ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.\deE]+)\s*(\w*)\s*")
 PERIODS = (
@@ -34,17 +36,16 @@ def bare(comment: str) -> str:
 def entries_in(lines: list[list[str]]) -> list[str]:
     """Entries in the cells of lines: one in a cell, or with the number in the cell behind it or below."""
     # A number that was cut at its comma, as 50,000 is, states nothing.
-    ends = [[*(cell[:1].isdigit() for cell in line[1:]), False] for line in lines]
     found = [
         cell
-        for line, cut in zip(lines, ends, strict=True)
-        for cell, no in zip(line, cut, strict=True)
-        if not no
+        for line in lines
+        for cell, behind in zip(line, [*line[1:], ""], strict=True)
+        if not (cell[-1:].isdigit() and behind[:1].isdigit())
     ]
     found += [
         f"{line[0]} = {line[1]}"
         for line in lines
-        if len(line) > 1 and not (len(line) > 2 and re.match(r"\d{3}\b", line[2]))
+        if len(line) > 1 and not re.match(r"\d{3}\b", "".join(line[2:3]))
     ]
     for upper, lower in itertools.pairwise(lines):
         found += [f"{name} = {value}" for name, value in zip(upper, lower, strict=False)]
