@@ -39,6 +39,30 @@ TABLE = "\n".join(f"{1e3 * t:.1f} {1e3 * x:.2f} {1e3 * u:.1f}" for t, u, x in RO
             {},
             id="zeros after a loss of power",
         ),
+        pytest.param(
+            "# column 1: t [ms]\n# column 2: x [nm]\n# column 3: u [mV]\n" + TABLE, {}, id="a comment each"
+        ),
+        pytest.param(f"# t[ms] x[nm] u[mV] -- by hand\n{TABLE}", {}, id="names among other words"),
+        pytest.param("time-ms;position-nm;drive-mV\n" + TABLE, {"voltage": "drive"}, id="parted otherwise"),
+        pytest.param(
+            "time (ms)\tPosition (Âµm)\tvoltage (mV)\n"
+            + "\n".join(f"{1e3 * t:.1f}\t{x:.5f}\t{1e3 * u:.1f}" for t, u, x in ROWS),
+            {},
+            id="wrong encoding",
+        ),
+        pytest.param("0,1,2\n" + "\n".join(f"{t:.4f},{u:.4f},{x:.5f}" for t, u, x in ROWS), {}, id="counted"),
+        pytest.param(
+            "time,voltage,displacement\n"
+            + "\n".join(f"0 days 00:00:{t:09.6f},{u:.4f},{x:.5f}" for t, u, x in ROWS),
+            {},
+            id="durations",
+        ),
+        pytest.param(
+            "time,voltage,displacement\n"
+            + "\n".join(f"2026/1/2 9:05:{t:06.3f} UTC,{u:.4f},{x:.5f}" for t, u, x in ROWS),
+            {},
+            id="a zone",
+        ),
     ],
 )
 def test_names_and_units_are_found(tmp_path: Path, text: str, columns: dict[str, str]) -> None:
@@ -87,3 +111,59 @@ def test_more_columns_than_are_wanted_need_numbers(tmp_path: Path) -> None:
     read_record(path)
     path.write_text("\n".join(f"{t:.3f},{u:.1f}" for t, u, _ in ROWS), encoding="utf-8")
     assert read_reference(path, sample_rate=1000.0).values[0] == ROWS[0][1]
+
+
+@pytest.mark.parametrize(
+    ("header", "form", "columns", "message"),
+    [
+        ("t [s],u [V],x [counts]", "{t},{u},{x}", {"displacement": "x [counts]"}, "no unit of displacement"),
+        ("t [s],u [V],x [0.1 µm]", "{t},{u},{x}", {"displacement": "x [0.1 µm]"}, "no unit of displacement"),
+        ("# t, position, amplifier", "{t},{x},{u}", {}, "no column for voltage"),
+        (",0,1,2", "0,{t},{u},{x}", {}, "no column for time"),
+        ("t,u,x", "{k}000000,{u},{x}", {}, "say the unit, such as units={'time': 'ns'}"),
+        ("t,u,x", "{day:.12f},{u},{x}", {}, "say the unit, such as units={'time': 'days'}"),
+    ],
+)
+def test_what_is_not_sure_is_refused(
+    tmp_path: Path, header: str, form: str, columns: dict[str, str], message: str
+) -> None:
+    path = tmp_path / "log.csv"
+    rows = [
+        form.format(t=f"{t:.4f}", u=f"{u:.4f}", x=f"{x:.5f}", k=k, day=45_000.0 + t / 86_400.0)
+        for k, (t, u, x) in enumerate(ROWS)
+    ]
+    path.write_text("\n".join([header, *rows]), encoding="utf-8")
+    with pytest.raises(ValueError, match=message):
+        read_record(path, columns=columns)
+
+
+def test_the_first_column_without_a_name_must_rise_as_time_does(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(f"{u:.4f},{x:.5f},{x:.5f}" for _, u, x in ROWS), encoding="utf-8")
+    with pytest.raises(ValueError, match="does not rise as time does"):
+        read_record(path, sample_rate=1000.0)
+
+
+@pytest.mark.parametrize(("stated", "rate"), [("# fs = 1000,5 Hz", 1000.5), ("# fs: 2,5 kHz", 2500.0)])
+def test_a_rate_is_written_as_the_rows_are(tmp_path: Path, stated: str, rate: float) -> None:
+    path = tmp_path / "log.xls"  # a text, in spite of its name
+    rows = [f"{u:.1f};{x:.3f}".replace(".", ",") for _, u, x in ROWS]
+    path.write_text("\n".join([stated, "voltage_V;displacement_um", *rows]), encoding="utf-8")
+    assert read_record(path).sample_rate == rate
+    path.write_text("\n".join(["# fs = 1.000 Hz", "voltage_V;displacement_um", *rows]), encoding="utf-8")
+    with pytest.raises(ValueError, match="sample rate"):
+        read_record(path)
+
+
+def test_a_rate_beside_its_unit(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        file["voltage"], file["position"] = ([row[k] for row in ROWS] for k in (1, 2))
+        file["sample_rate"] = 2.0
+        file["sample_rate"].attrs["unit"] = "kHz"
+    assert read_record(path).sample_rate == 2000.0
+    with h5py.File(path, "a") as file:
+        file["sample_rate"].attrs["unit"] = "1/min"
+    with pytest.raises(ValueError, match="sample rate"):
+        read_record(path)

@@ -10,14 +10,17 @@ from piezoest.records.source import LogError, Source, counted, shown
 
 # Names by which logs call the quantities, in lower case; the unit stands beside them.
 NAMES = {
-    "time": ("time", "t", "timestamp", "time stamp", "datetime", "seconds", "elapsed", "zeit"),
+    "time": (
+        "time", "t", "timestamp", "time stamp", "datetime", "seconds", "elapsed", "elapsed time", "zeit",
+    ),
     "voltage": (
         "voltage", "u", "v", "volt", "volts", "vin", "drive", "input", "control voltage", "output voltage",
-        "piezo voltage", "spannung",
+        "piezo voltage", "drive voltage", "command voltage", "applied voltage", "spannung",
     ),
     "displacement": (
         "displacement", "x", "y", "w", "disp", "position", "pos", "measured", "measurement", "output",
-        "sensor", "gauge", "weg", "actual position", "current position",
+        "sensor", "gauge", "weg", "actual position", "current position", "measured position",
+        "measured displacement", "sensor position", "stage position",
     ),
     "reference": (
         "reference", "ref", "r", "setpoint", "target", "desired", "target position", "commanded position",
@@ -33,11 +36,15 @@ UNITS = {
     "displacement": {"um": 1.0, "micron": 1.0, "microns": 1.0, "nm": 1e-3, "pm": 1e-6, "mm": 1e3, "m": 1e6,
                      "micrometer": 1.0, "micrometers": 1.0, "micrometre": 1.0, "micrometres": 1.0,
                      "nanometers": 1e-3, "nanometres": 1e-3, "millimeters": 1e3, "millimetres": 1e3,
-                     "angstrom": 1e-4, "angstroms": 1e-4, "cm": 1e4, "centimeters": 1e4, "centimetres": 1e4,
-                     "meter": 1e6, "meters": 1e6, "metre": 1e6, "metres": 1e6},
+                     "angstrom": 1e-4, "angstroms": 1e-4, "å": 1e-4, "cm": 1e4, "centimeters": 1e4,
+                     "centimetres": 1e4, "meter": 1e6, "meters": 1e6, "metre": 1e6, "metres": 1e6},
 }  # fmt: skip
 UNITS["reference"] = UNITS["displacement"]
 BASE_UNITS = {"time": "s", "voltage": "V", "displacement": "µm", "reference": "µm"}
+# What columns without names are.
+UNNAMED = ("time", "voltage", "displacement")
+# A word, or a number with one, in brackets behind a name.
+IN_BRACKETS = re.compile(r".+[\[(]\s*((?:\d[-+.\deE]*\s*)?[^\W\d_][^\s\d_\[\]()]*)\s*[\])]")
 # Sentences have such words, names of columns have not.
 LITTLE_WORDS = frozenset(
     ("a", "and", "are", "at", "by", "for", "from", "in", "is", "of", "on", "the", "to", "with", "und", "vs")
@@ -168,14 +175,20 @@ def _listed(source: Source) -> str:
 def split_unit(title: str) -> tuple[str, str]:
     """Split ``drive_mV``, ``pos [nm]``, ``t (ms)``, ``x/µm`` into name and unit in lower case."""
     # MATLAB and R write brackets as _ and dots.
-    plain = with_u(unicodedata.normalize("NFKC", title).strip().rstrip("_."))
-    match = re.fullmatch(r"(.+?)\s*(?:[\[({<](\w+)[\])}>]|[/_\s.]\s*([^\W_]+))", plain)
+    plain = with_u(unicodedata.normalize("NFKC", with_u(title))).strip().rstrip("_.:*")
+    match = re.fullmatch(r"(.+?)\s*(?:[\[({<](\w+)[\])}>]|[-/_\s.]\s*([^\W_]+))", plain)
     if match is None:
         return plain, ""
     unit = next(group for group in match.groups()[1:] if group).lower()
     if any(unit in units for units in UNITS.values()):
         return match[1].replace("_", " ").strip(" ."), unit
     return plain.replace("_", " "), ""
+
+
+def _states_other_unit(title: str) -> bool:
+    """Whether brackets behind a name hold a word or ``0.1 µm``, and so no known unit, and no other name."""
+    behind = IN_BRACKETS.fullmatch(title.strip())
+    return behind is not None and not any(behind[1].lower() in names for names in NAMES.values())
 
 
 def names_columns(titles: list[str]) -> bool:
@@ -187,6 +200,16 @@ def names_columns(titles: list[str]) -> bool:
     if None not in found and len(set(found)) == len(titles):
         return True
     return {"voltage", "displacement"}.issubset(found) and LITTLE_WORDS.isdisjoint(map(str.lower, titles))
+
+
+def names_other_order(titles: list[str]) -> bool:
+    """Whether two or more titles are a quantity each that stands elsewhere than in columns without names."""
+    names = [split_unit(title)[0].lower() for title in titles]
+    called = [next((each for each in NAMES if _is_called(name, each)), None) for name in names]
+    places = {k: each for k, each in enumerate(called) if each is not None}
+    usual = dict(enumerate(UNNAMED[-len(titles) :]))
+    elsewhere = any(usual.get(k) != each for k, each in places.items())
+    return elsewhere and len(set(places.values())) == len(places) > 1 and LITTLE_WORDS.isdisjoint(names)
 
 
 def _quantity(title: str) -> str | None:
@@ -237,8 +260,8 @@ def _of_unit(unit: str) -> str | None:
 
 
 def with_u(text: str) -> str:
-    """With u for the signs of micro, one of which is what a wrong encoding leaves of them."""
-    return text.replace("µ", "u").replace("μ", "u").replace("\N{REPLACEMENT CHARACTER}", "u")
+    """With u for the signs of micro, the first three of which are what a wrong encoding leaves of them."""
+    return re.sub("\N{REPLACEMENT CHARACTER}|Âµ|Î¼|µ|μ", "u", text)
 
 
 def _factor(source: Source, title: str, quantity: str) -> tuple[float, str]:
@@ -246,7 +269,7 @@ def _factor(source: Source, title: str, quantity: str) -> tuple[float, str]:
     # Only mega would differ from milli by case, and no log has it: units are in lower case here.
     _, unit = split_unit(title)
     base = BASE_UNITS[quantity]
-    if unit and unit not in UNITS[quantity]:
+    if (unit and unit not in UNITS[quantity]) or (not unit and _states_other_unit(title)):
         raise LogError(
             f"{source.path}: column {title!r} has no unit of {quantity}, such as {base}: convert it, or say "
             f"what 1 in it stands for: units={{'{quantity}': '2 {base}'}}, or --units {quantity}='2 {base}'"

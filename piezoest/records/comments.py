@@ -3,7 +3,7 @@
 import itertools
 import re
 
-from piezoest.records.cells import WORDS
+from piezoest.records.cells import ONE_GROUP, WORDS, Style, number
 from piezoest.records.columns import UNITS, with_u
 from piezoest.records.source import RATES, stated_rate
 
@@ -12,15 +12,15 @@ COMMENTS = ("#", "%")
 ERRORS = "|".join(re.escape(word) for word in WORDS if word.startswith(COMMENTS))
 COMMENT = rf"(?!(?i:{ERRORS})[^\S\n]*(?:[-+.,;|\d\n]|\Z))[#%]"
 # A line ``sample rate [kHz]: 10`` or ``SAMPLE_TIME = 5e-05``, with the unit beside the name or the number.
-ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.\deE]+)\s*(\w*)\s*")
+ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.,\deE]+)\s*(\w*)\s*")
 PERIODS = (
     "dt", "ts", "sample_time", "sampling_time", "sample_period", "sampling_period", "sample_interval", "tinc",
 )  # fmt: skip
-# What the units are in Hz and in s.
-OF_RATES = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6}
+# What the units are in s.
 OF_PERIODS = {"": 1.0, **UNITS["time"]}
-# A line ``NAME0 = Actual Position of Axis 1``, of which Physik Instrumente's GCS arrays have one a column.
-NUMBERED_NAME = re.compile(r"\s*NAME(\d+)\s*=\s*(\S.*?)\s*")
+# A line ``NAME0 = Actual Position of Axis 1``, of which Physik Instrumente's GCS arrays have one a column, or
+# ``column 1: time [s]``.
+NUMBERED_NAME = re.compile(r"\s*(?:name|col\.?|column|spalte|channel)\s*(\d+)\s*[=:]\s*(\S.*?)\s*", re.I)
 
 
 def is_comment(line: str) -> bool:
@@ -52,21 +52,32 @@ def entries_in(lines: list[list[str]]) -> list[str]:
     return found
 
 
-def rate_in(comments: list[str]) -> float | None:
-    """Sample rate that comments state [Hz]; None if they state none, or several."""
-    found = {_rate_of(entry) for comment in comments if (entry := ENTRY.fullmatch(bare(comment)))} - {None}
+def rate_in(comments: list[str], style: Style) -> float | None:
+    """Sample rate that comments state [Hz], in numbers as rows write them; None for none, or several."""
+    entries = [entry for comment in comments if (entry := ENTRY.fullmatch(bare(comment)))]
+    found = {_rate_of(entry, style) for entry in entries} - {None}
     return found.pop() if len(found) == 1 else None
 
 
-def _rate_of(entry: re.Match[str]) -> float | None:
+def _rate_of(entry: re.Match[str], style: Style) -> float | None:
     """Sample rate that an entry states [Hz], itself or by its period; None if it is another entry."""
     name, unit = entry[1].lower().replace(" ", "_"), with_u(entry[2] or entry[4]).lower()
-    number = stated_rate(entry[3])
-    if number is not None and name in RATES and unit in OF_RATES:
-        return stated_rate(number * OF_RATES[unit])
-    if number is not None and name in PERIODS and unit in OF_PERIODS:
-        return stated_rate(1.0 / number / OF_PERIODS[unit])
+    value = _value(entry[3], style)
+    if value is not None and name in RATES:
+        return stated_rate(value, unit)
+    if value is not None and name in PERIODS and unit in OF_PERIODS:
+        return stated_rate(1.0 / value / OF_PERIODS[unit])
     return None
+
+
+def _value(text: str, style: Style) -> float | None:
+    """Number above zero that an entry states; None for 1.000 or 1,000 where that may be a thousand."""
+    if ONE_GROUP.fullmatch(text) and not (style.thousands or style.decimal == "." in text):
+        return None
+    try:
+        return stated_rate(number(text, style))
+    except ValueError:
+        return stated_rate(text)
 
 
 def numbered_names(comments: list[str]) -> list[str]:

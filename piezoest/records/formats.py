@@ -57,9 +57,9 @@ class Table(Source):
 
         with damaged(path, format_), opened() as file:
             found = list(arrays(file))
-            for name, values, _ in found:
+            for name, values, unit in found:
                 if leaf(name).lower() in RATES and np.prod(_shape(values)) == 1:
-                    self.sample_rate = stated_rate(values[0:1] if _shape(values) else values[()])
+                    self.sample_rate = stated_rate(values[0:1] if _shape(values) else values[()], unit)
             columns = list(_columns(found))
             names = [name for name, _, _ in columns]
             self._lengths = [_shape(values)[0] for _, values, _ in columns]
@@ -215,9 +215,10 @@ def open_hdf5(path: Path) -> Table:
 
 def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
     found: list[Named] = [
-        (name, np.asarray(value), "") for name, value in file.attrs.items()
+        (name, np.asarray(value), _unit(file.attrs, f"{name}_unit", f"{name}_units"))
+        for name, value in file.attrs.items()
         if name.lower() in RATES and np.size(value) == 1
-    ]  # fmt: skip
+    ]
     # A link is followed by nobody here, but a column that is not found for it would be a riddle.
     if outside := file.visititems_links(
         lambda name, link: name if isinstance(link, h5py.ExternalLink) else None
@@ -239,13 +240,16 @@ def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
             fields = [field for field in item.dtype.names if item.dtype[field].kind in "fiu"]
             found.extend((f"{name}/{field}", item.fields(field), "") for field in fields)
         elif item.dtype.kind in "fiu" and item.attrs.get("MATLAB_class") not in (b"char", "char"):
-            unit = next((item.attrs[key] for key in ("unit", "units") if key in item.attrs), "")
-            found.append(
-                (name, item, unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit))
-            )
+            found.append((name, item, _unit(item.attrs, "unit", "units")))
 
     file.visititems(visit)
     return found
+
+
+def _unit(attributes: Any, *keys: str) -> str:
+    """Unit that attributes state under one of the names; empty if none does."""
+    unit = next((attributes[key] for key in keys if key in attributes), "")
+    return unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)
 
 
 # ---------------------------------------------------------------- TDMS

@@ -4,9 +4,10 @@ import importlib
 import zipfile
 from pathlib import Path
 
-from piezoest.records.lines import PACKED, beginning
+from piezoest.records.lines import PACKED, beginning, encoding_of
 from piezoest.records.source import LogError, Source
 
+OF_SHEETS = "frame:open_sheet"
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat")
 SHEET_ENDINGS = (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods")
 ARCHIVE = b"PK\x03\x04"
@@ -17,7 +18,7 @@ FORMATS: tuple[tuple[str, tuple[bytes, ...], tuple[str, ...], str], ...] = (
     ("MATLAB", (b"MATLAB 5.0",), (), "formats:open_mat"),
     ("NumPy", (b"\x93NUMPY",), (".npy",), "formats:open_npy"),
     ("TDMS", (b"TDSm",), (".tdms",), "formats:Tdms"),
-    ("spreadsheet", (ARCHIVE, b"\xd0\xcf\x11\xe0"), SHEET_ENDINGS, "frame:open_sheet"),
+    ("spreadsheet", (ARCHIVE, b"\xd0\xcf\x11\xe0"), SHEET_ENDINGS, OF_SHEETS),
     ("NumPy", (ARCHIVE,), (".npz",), "formats:open_npz"),
     ("LabVIEW", (b"LabVIEW Measurement", b"\xef\xbb\xbfLabVIEW Measurement"), (), "lvm:Lvm"),
     ("MATLAB", (), (".mat",), "formats:open_mat"),  # before version 5 it has no mark
@@ -42,7 +43,7 @@ def open_source(path: Path) -> Source:
             break
         if ending in endings and not beginnings:
             opener = function
-        elif ending in endings:
+        elif ending in endings and not (function == OF_SHEETS and _is_text(path)):
             raise LogError(
                 f"{path}: this is no {name} file, although its name ends in {ending}: "
                 "it may be truncated, or of another format under a wrong name"
@@ -50,6 +51,15 @@ def open_source(path: Path) -> Source:
     # What a format needs is imported only now.
     module, _, function = opener.partition(":")
     return getattr(importlib.import_module(f"piezoest.records.{module}"), function)(path)
+
+
+def _is_text(path: Path) -> bool:
+    """Whether a file is a text, which instruments often give the name of a spreadsheet."""
+    try:
+        encoding_of(path)
+    except LogError:
+        return False
+    return True
 
 
 def _is_other(path: Path, name: str) -> bool:

@@ -19,6 +19,7 @@ PLENTY, MOST_PACKED = 1 << 28, 200
 LONGEST_SHOWN = 60
 # Names under which a file may state its sample rate [Hz], in lower case.
 RATES = ("fs", "f_s", "sample_rate", "samplerate", "sampling_rate", "sample_rate_hz")
+OF_RATES = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6}
 
 
 class LogError(ValueError):
@@ -104,11 +105,11 @@ def counted(number: int, noun: str = "time") -> str:
     return "once" if number == 1 and noun == "time" else f"{number} {noun}{'s' * (number != 1)}"
 
 
-def stated_rate(value: Any) -> float | None:
-    """Sample rate that a file states [Hz]; None if it is not one number above zero."""
+def stated_rate(value: Any, unit: str = "") -> float | None:
+    """Sample rate that a file states [Hz]; None if it is not one number above zero, or of unknown unit."""
     try:
-        number = float(np.asarray(value).reshape(()))
-    except (TypeError, ValueError, OverflowError):
+        number = OF_RATES[unit.strip().lower()] * float(np.asarray(value).reshape(()))
+    except (TypeError, ValueError, OverflowError, KeyError):
         return None
     return number if 0.0 < number < np.inf else None
 

@@ -26,8 +26,12 @@ NAMED = re.compile(rf"(\d{{1,2}})[-. ]\s*{NAME}[-. ]\s*(?=\d)", re.IGNORECASE)
 # Nov 22, 2026 10:00:00, and Sun Nov 22 10:00:00 2026 of the C library
 NAME_FIRST = re.compile(rf"{NAME}\.? +(\d{{1,2}})[,.]? +(?=\d{{4}}\b)", re.IGNORECASE)
 YEAR_LAST = re.compile(rf"[a-z]{{3}} +{NAME} +(\d{{1,2}}) +(\d\d:\d\d:\d\d\S*) +(\d{{4}})", re.IGNORECASE)
-# 20261122T100000
-WITHOUT_MARKS = re.compile(r"(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)(?!\d)")
+# 20261122T100000, 2026/1/2 and the 0 days 10:00:00 of pandas
+WITHOUT_MARKS = re.compile(r"(\d{4})(\d\d)(\d\d)[T -](\d\d):?(\d\d):?(\d\d)(?!\d)")
+SHORT_DATE = re.compile(r"(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})(?=[T ])")
+DAYS = re.compile(r"([0-9]|[12]\d) days? \+?(?=\d)")
+# What stands behind a time says nothing more: a time without zone is taken as UTC.
+ZONE = re.compile(r"\s*(?:UTC|GMT)$")
 MILLISECONDS = re.compile(r"(:\d{2}:\d{2}):(?=\d{3}(?!\d))")
 DAY = "2000-01-01T"
 # A clock that begins anew stands so near its beginning, in parts of a turn; elsewhere it was set.
@@ -36,7 +40,10 @@ NEAR = 1.0 / 24.0
 
 def _plain(cell: str) -> str:
     """Cell with numbers for names of months, the usual marks, and a point before milliseconds."""
-    cell = WITHOUT_MARKS.sub(r"\1-\2-\3T\4:\5:\6", YEAR_LAST.sub(r"\2-\1-\4 \3", cell.strip()))
+    cell = ZONE.sub("", cell.strip())
+    cell = WITHOUT_MARKS.sub(r"\1-\2-\3 \4:\5:\6", YEAR_LAST.sub(r"\2-\1-\4 \3", cell))
+    cell = SHORT_DATE.sub(lambda date: f"{date[1]}-{date[2]:0>2}-{date[3]:0>2}", cell)
+    cell = DAYS.sub(lambda days: f"2000-01-{int(days[1]) + 1:0>2} ", cell)
     cell = NAMED.sub(lambda date: f"{date[1]}.{_number(date[2])}.", NAME_FIRST.sub(r"\2-\1-", cell))
     return MILLISECONDS.sub(r"\1.", cell)
 
@@ -66,7 +73,8 @@ def times_of(cells: Any, day_first: bool = False) -> Any:
     other = times.isna() & (words != "")
     if not other.any():
         return times
-    words[other] = [_as_iso(_plain(word), day_first) for word in words[other]]
+    plain = map(_plain, words[other])
+    words[other] = [_as_iso(word, day_first) or word for word in plain]
     return pd.to_datetime(words, format="ISO8601", utc=True, errors="coerce")
 
 

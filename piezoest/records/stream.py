@@ -15,8 +15,11 @@ from piezoest.records.timing import Timing, placed, scan
 FEWEST_ROWS = 10
 # Rows by which a sample rate that is given is compared with the column of time, and how near it must be.
 FIRST_ROWS, SAME_RATE = 1000, 0.01
-# Time since 1970 is between these [s] from 1973 to 2286: so its size tells its unit, one of these.
-SINCE_1970 = 1e8, 1e10
+# Time since 1970 is between these [s] from 2000 to 2100: so its size tells its unit, one of these.
+SINCE_1970 = 9.4e8, 4.1e9
+# A column without a unit is not in seconds if these are farther apart than some minutes, or if they count
+# days, as spreadsheets do from 1900 on: then a sample seems to take less than a microsecond.
+LONGEST_PERIOD, SHORTEST_OF_DAYS, DAYS = 600.0, 2e-6, 1e4
 OF_STAMPS = ("ms", "us", "ns")
 
 # Called with how much is done, and of how much.
@@ -91,6 +94,8 @@ class RecordStream:
             notes.append(f"sample rate of {sample_rate:g} Hz as the file states it")
         timed = ("time",) if sample_rate is None else ()
         self._chosen = choose(source, (*timed, *wanted), named, units)
+        if sample_rate is not None and not source.titles and not named:
+            _check_first_column(source, len(wanted))
         if sample_rate is not None and not notes:
             notes += _contradicted(source, named, units, sample_rate)
         self._positions = [column.position for column in self._chosen.values()]
@@ -295,13 +300,35 @@ def _in_seconds(source: Source, column: Column, units: Mapping[str, str], times:
     known = times[np.isfinite(times)]
     if "time" in units or (source.titles and split_unit(column.title)[1]) or not known.size:
         return column
-    first = float(known[0])
+    first, period = float(known[0]), float(np.median(np.diff(known))) if known.size > 1 else 1.0
     for unit in OF_STAMPS:
         factor = UNITS["time"][unit]
         if SINCE_1970[0] <= factor * first < SINCE_1970[1]:
             said = f"column {column.title!r}: taken as {unit.replace('us', 'µs')} since 1970"
-            return column._replace(factor=factor, note=said)
+            column = column._replace(factor=factor, note=said)
+            break
+    seconds = column.factor * period
+    of_days = 0.0 < seconds < SHORTEST_OF_DAYS and abs(first) > DAYS
+    if seconds > LONGEST_PERIOD or of_days:
+        unit = "days" if of_days else "ns"
+        raise LogError(
+            f"{source.path}: column {column.title!r} has no unit; its rows would be {seconds:.3g} s apart: "
+            f"say the unit, such as units={{'time': '{unit}'}}, or --units time={unit}"
+        )
     return column
+
+
+def _check_first_column(source: Source, wanted: int) -> None:
+    """Refuse columns without names of which the first, beside those that are wanted, is not time."""
+    if source.width == wanted:
+        return
+    first = next((rows.values[0] for rows in source.read([0], FIRST_ROWS)), np.empty(0))
+    if np.any(np.diff(first[np.isfinite(first)]) < 0.0):
+        raise LogError(
+            f"{source.path}: {source.width} columns without a header, and the first does not rise as time "
+            "does: name voltage and displacement by their numbers, such as columns={'voltage': '1', "
+            "'displacement': '2'}, or --columns voltage=1,displacement=2"
+        )
 
 
 def _contradicted(
@@ -313,9 +340,9 @@ def _contradicted(
     try:
         column = choose(source, ("time",), named, units)["time"]
         times = next(source.read([column.position], FIRST_ROWS)).values[0][:FIRST_ROWS]
+        column = _in_seconds(source, column, units, times)
     except (LogError, StopIteration):
         return []
-    column = _in_seconds(source, column, units, times)
     steps = column.factor * np.diff(times[np.isfinite(times)])
     rate = 1.0 / float(np.median(steps)) if steps.size and np.median(steps) > 0.0 else sample_rate
     if abs(rate / sample_rate - 1.0) < SAME_RATE:

@@ -15,7 +15,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.records import scopes
 from piezoest.records.cells import MISSING, Marks, Style, is_missing, is_number, number, style_of
-from piezoest.records.columns import names_columns, titled, with_units
+from piezoest.records.columns import names_columns, names_other_order, titled, with_units
 from piezoest.records.comments import bare, entries_in, is_comment, numbered_names, rate_in
 from piezoest.records.lines import (
     LONGEST_FOOTER,
@@ -35,6 +35,8 @@ MOST_BLANK = 0.1
 HEAD_LINES, STAMP_ROWS = 10_000, 100
 # Lines that instruments write above the header, at most.
 LONGEST_PREAMBLE = 200
+# A name with a unit in brackets, among other words.
+WITH_UNIT = re.compile(r"[^\s,;|]+\s*[\[(][^\s\])]+[\])]")
 # Lines that are looked at together.
 PART = 500
 
@@ -90,7 +92,8 @@ def layout_of(path: Path) -> Layout:
                     stamps[i] = Clock.of(cell)
     width, skip_blank = len(header or _cells(path, texts[0])), between > MOST_BLANK * len(filled)
     style = _style(path, _without_footer(texts, delimiter), delimiter)
-    begins, rate = rows[0][0], rate_in([*above, *entries_in(preamble), *scopes.entries(preamble)])
+    begins = rows[0][0]
+    rate = rate_in([*above, *entries_in(preamble), *scopes.entries(preamble)], style)
     return Layout(path, encoding, delimiter, header, width, begins, skip_blank, style, stamps, rate)
 
 
@@ -117,9 +120,12 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
     like_first = len(head[begins]) == len(first) and _delimiter(filled[begins][1]) == mark
     like_first &= begins < 2 or names_columns(first) or not names_columns(head[begins - 1])
     if begins < 2 or like_first or len(head) < min(len(filled), LONGEST_PREAMBLE):
-        header, begins = ([], 0) if _numeric(first) else (first, 1)
+        header, begins = ([], 0) if _is_row_of_numbers(first) else (first, 1)
+        if (counted := _counted(first, head[1:2])) is not None:
+            header, begins = counted, 1
         if header and len(head) > 1:
-            # Numbers with decimal commas may be parted by blanks.
+            # Numbers with decimal commas may be parted by blanks, and rows otherwise than names.
+            mark = mark if len(header) != len(head[1]) else _delimiter(filled[1][1])
             second = split(path, [filled[1][1]], mark)[0] if mark == " " else head[1]
             if len(header) != len(second):
                 header = _titles(path, filled[0][1], mark, len(second))
@@ -143,7 +149,7 @@ def _named_in_comments(path: Path, comments: list[str], row: str, delimiter: str
     for line in reversed(comments):
         names = _titles(path, bare(line), delimiter, width)
         for found in (with_units(names, below), names):
-            if len(found) == width and names_columns(found):
+            if len(found) == width and (names_columns(found) or names_other_order(found)):
                 return found
         below = names
     return []
@@ -154,7 +160,7 @@ def _titles(path: Path, line: str, delimiter: str, width: int) -> list[str]:
     text = line.strip()
     ways = [split(path, [text], mark)[0] for mark in (delimiter, _delimiter(text))]
     # Names may hold single blanks, as in ``time (s)``.
-    ways += [re.split(r"\s+(?![(\[])", text), re.split(r"\s{2,}|\t", text)]
+    ways += [re.split(r"\s+(?![(\[])", text), re.split(r"\s{2,}|\t", text), re.findall(WITH_UNIT, text)]
     fit = [[cell.strip() for cell in way] for way in ways if len(way) == width]
     return next(filter(names_columns, fit), fit[0] if fit else ways[0])
 
@@ -168,6 +174,22 @@ def _without_footer(lines: list[str], delimiter: str) -> list[str]:
     """Lines but the last ones that are no rows; all of them if they are many."""
     before, last = lines[:-LONGEST_FOOTER], lines[-LONGEST_FOOTER:]
     return before + last[: end_of_rows(last, lambda line: _is_row(line, delimiter)) or len(last)]
+
+
+def _is_row_of_numbers(cells: list[str]) -> bool:
+    """Whether all cells are numbers, or most beside a text behind them."""
+    known = [is_number(cell) for cell in cells]
+    return all(known) or (known[0] and cells[0] != "" and 2 * sum(known) > len(cells))
+
+
+def _counted(cells: list[str], below: list[list[str]]) -> list[str] | None:
+    """Names of columns that pandas only counts: none for 0, 1, 2; all if an index stands before them."""
+    numbers = [str(k) for k in range(len(cells))]
+    if not any("." in cell for row in below for cell in row):
+        return None
+    if cells[:1] == [""] and cells[1:] == numbers[:-1]:
+        return cells
+    return [] if cells == numbers else None
 
 
 def _numeric(*rows: list[str]) -> bool:
@@ -364,5 +386,7 @@ def open_text(path: Path) -> Text:
     """Open a text file with one row per sample; ValueError if it is none."""
     layout = layout_of(path)
     # Time stamps come out in seconds, whatever the header says.
-    titles = [titled(name, "s" if i in layout.stamps else "") for i, name in enumerate(layout.header)]
+    titles = [
+        titled(name or "time", "s") if i in layout.stamps else name for i, name in enumerate(layout.header)
+    ]
     return Text(layout, layout.header, titles)
