@@ -63,6 +63,22 @@ TABLE = "\n".join(f"{1e3 * t:.1f} {1e3 * x:.2f} {1e3 * u:.1f}" for t, u, x in RO
             {},
             id="a zone",
         ),
+        pytest.param(
+            "# Units: ms, nm, mV\ntime,displacement,voltage\n" + TABLE.replace(" ", ","),
+            {},
+            id="line of units",
+        ),
+        pytest.param(
+            '"t","u","x"\n' + "\n".join(f'"{k}",{t},{u},{x}' for k, (t, u, x) in enumerate(ROWS, 1)),
+            {},
+            id="numbers of rows from R",
+        ),
+        pytest.param(
+            "Time [ ms ],Error [mm],Output [mV],Position [nanometer]\n"
+            + "\n".join(f"{1e3 * t:.1f},0.5,{1e3 * u:.1f},{1e3 * x:.2f}" for t, u, x in ROWS),
+            {"voltage": "Output"},
+            id="a name of two quantities",
+        ),
     ],
 )
 def test_names_and_units_are_found(tmp_path: Path, text: str, columns: dict[str, str]) -> None:
@@ -94,7 +110,10 @@ def test_a_rate_beside_other_numbers_is_taken(tmp_path: Path) -> None:
     assert read_record(path).sample_rate == 10e3
 
 
-@pytest.mark.parametrize("stated", ["Sample rate: 50,000 Hz", "Sample rate,1,000"])
+@pytest.mark.parametrize(
+    "stated",
+    ["Sample rate: 50,000 Hz", "Sample rate,1,000", "Sample rate (Hz): 50 000", "fs = 1\nfs unit = kHz"],
+)
 def test_a_rate_that_is_cut_at_its_comma_is_not_taken(tmp_path: Path, stated: str) -> None:
     path = tmp_path / "log.csv"
     rows = "\n".join(f"{u:.1f},{x:.3f}" for _, u, x in ROWS)
@@ -118,6 +137,11 @@ def test_more_columns_than_are_wanted_need_numbers(tmp_path: Path) -> None:
     [
         ("t [s],u [V],x [counts]", "{t},{u},{x}", {"displacement": "x [counts]"}, "no unit of displacement"),
         ("t [s],u [V],x [0.1 µm]", "{t},{u},{x}", {"displacement": "x [0.1 µm]"}, "no unit of displacement"),
+        ("t,u,x_nm_raw", "{t},{u},{x}", {"displacement": "x_nm_raw"}, "no unit of displacement"),
+        ("t,u,x [10^-9 m]", "{t},{u},{x}", {"displacement": "x [10^-9 m]"}, "no unit of displacement"),
+        ("# x in nm\nt,u,x", "{t},{u},{x}", {}, "beside the header stands '# x in nm'"),
+        ("t,u,x,,u,x", "{t},{u},{x},,{u},{x}", {}, "give the number of the one that is, 2 or 5"),
+        ("t [s],u [V],Error [nm]", "{t},{u},{x}", {}, "no column for displacement"),
         ("# t, position, amplifier", "{t},{x},{u}", {}, "no column for voltage"),
         (",0,1,2", "0,{t},{u},{x}", {}, "no column for time"),
         ("t,u,x", "{k}000000,{u},{x}", {}, "say the unit, such as units={'time': 'ns'}"),
@@ -153,6 +177,25 @@ def test_a_rate_is_written_as_the_rows_are(tmp_path: Path, stated: str, rate: fl
     path.write_text("\n".join(["# fs = 1.000 Hz", "voltage_V;displacement_um", *rows]), encoding="utf-8")
     with pytest.raises(ValueError, match="sample rate"):
         read_record(path)
+
+
+@pytest.mark.parametrize("stated", ["Sample Interval,0.5,ms", "Sample rate;2;kHz", "fs: 2 kHz"])
+def test_a_rate_with_its_unit_in_a_cell_of_its_own(tmp_path: Path, stated: str) -> None:
+    path = tmp_path / "log.csv"
+    rows = "\n".join(f"{u:.1f},{x:.3f}" for _, u, x in ROWS)
+    path.write_text(f"Scope 12\n{stated}\nvoltage_V,displacement_um\n{rows}", encoding="utf-8")
+    assert read_record(path).sample_rate == 2000.0
+
+
+def test_names_and_units_beside_arrays(tmp_path: Path) -> None:
+    t, u, x = np.transpose(ROWS)
+    path = tmp_path / "log.npz"
+    np.savez(path, data=np.column_stack([t, x, u]), columns=["t", "x", "u"])
+    record = read_record(path)
+    np.testing.assert_allclose(record.voltage, u)
+    np.testing.assert_allclose(record.displacement, x)
+    np.savez(path, t=t, u=u, x=1e3 * x, x_unit="nm")
+    np.testing.assert_allclose(read_record(path).displacement, x)
 
 
 def test_a_rate_beside_its_unit(tmp_path: Path) -> None:

@@ -30,21 +30,36 @@ UNITS = {
     "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0,
              "msec": 1e-3, "usec": 1e-6, "h": 3600.0, "hr": 3600.0, "second": 1.0, "seconds": 1.0,
              "milliseconds": 1e-3, "microseconds": 1e-6, "minutes": 60.0, "hours": 3600.0, "days": 86_400.0,
-             "nanoseconds": 1e-9},
+             "nanoseconds": 1e-9, "millisecond": 1e-3, "microsecond": 1e-6, "nanosecond": 1e-9},
     "voltage": {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "kv": 1e3, "millivolts": 1e-3,
-                "microvolts": 1e-6, "kilovolts": 1e3},
+                "microvolts": 1e-6, "kilovolts": 1e3, "millivolt": 1e-3, "microvolt": 1e-6, "kilovolt": 1e3},
     "displacement": {"um": 1.0, "micron": 1.0, "microns": 1.0, "nm": 1e-3, "pm": 1e-6, "mm": 1e3, "m": 1e6,
                      "micrometer": 1.0, "micrometers": 1.0, "micrometre": 1.0, "micrometres": 1.0,
                      "nanometers": 1e-3, "nanometres": 1e-3, "millimeters": 1e3, "millimetres": 1e3,
+                     "nanometer": 1e-3, "nanometre": 1e-3, "millimeter": 1e3, "millimetre": 1e3,
                      "angstrom": 1e-4, "angstroms": 1e-4, "å": 1e-4, "cm": 1e4, "centimeters": 1e4,
                      "centimetres": 1e4, "meter": 1e6, "meters": 1e6, "metre": 1e6, "metres": 1e6},
 }  # fmt: skip
 UNITS["reference"] = UNITS["displacement"]
 BASE_UNITS = {"time": "s", "voltage": "V", "displacement": "µm", "reference": "µm"}
+# Words that say in what a column counts: units of more than one letter, and what is none.
+SCALES = {unit for units in UNITS.values() for unit in units if len(unit) > 1} | {
+    "count", "counts", "code", "codes", "adc", "dac", "lsb", "percent", "pct", "inch", "inches",
+}  # fmt: skip
+# Words of other quantities that have the same units.
+OTHERS = {
+    "time": ("exposure", "delay", "period", "lag", "jitter"),
+    "voltage": ("supply", "photodiode", "noise", "rms", "error", "sensor"),
+    "displacement": (
+        "error", "err", "set", "setpoint", "target", "command", "commanded", "cmd", "des", "desired", "sp",
+        "soll", "sollwert", "wavelength", "step", "noise", "rms",
+    ),
+    "reference": (),
+}  # fmt: skip
 # What columns without names are.
 UNNAMED = ("time", "voltage", "displacement")
-# A word, or a number with one, in brackets behind a name.
-IN_BRACKETS = re.compile(r".+[\[(]\s*((?:\d[-+.\deE]*\s*)?[^\W\d_][^\s\d_\[\]()]*)\s*[\])]")
+# What stands in brackets behind a name; it is the number of an axis or a channel, no unit: 1, AO0, axis 2.
+IN_BRACKETS, CHANNEL = re.compile(r".+[\[(]\s*(.+?)\s*[\])]"), re.compile(r"(?:(?!x\d)[a-z]+[ _]?)?\d+")
 # Sentences have such words, names of columns have not.
 LITTLE_WORDS = frozenset(
     ("a", "and", "are", "at", "by", "for", "from", "in", "is", "of", "on", "the", "to", "with", "und", "vs")
@@ -140,21 +155,25 @@ def _find(source: Source, quantity: str, name: str) -> int:
 
 
 def _guess(source: Source, quantity: str) -> int:
-    names = [split_unit(title)[0] for title in source.titles]
-    found = [i for i, name in enumerate(names) if _is_called(name, quantity)]
-    if not found and quantity == "reference":
+    names, units = zip(*map(split_unit, source.titles), strict=True) if source.titles else ((), ())
+    called = [i for i, name in enumerate(names) if _is_called(name, quantity)]
+    # A name may be that of two quantities, as output is: then the unit tells.
+    found = [i for i in called if not units[i] or units[i] in UNITS[quantity]]
+    if not called and quantity == "reference":
         return _guess(source, "displacement")
     if not found:
-        found = [i for i, title in enumerate(source.titles) if _quantity(title) == quantity]
+        others = [not set(re.split(r"\W+", name.lower())).isdisjoint(OTHERS[quantity]) for name in names]
+        alike = [i for i, unit in enumerate(units) if unit in UNITS[quantity] and not others[i]]
+        found = [i for i in alike if _quantity(source.titles[i]) == quantity] or called
     if len(found) == 1:
         return found[0]
     if found:
         titles = ", ".join(shown(source.names[i]) for i in found[:MOST_LISTED])
-        both = quantity == "voltage" and not has_column(source, "displacement")
-        raise LogError(
-            f"{source.path}: the columns {titles} could all be the {quantity}"
-            + (OF_TWO_VOLTAGES.format(*(names[i] for i in found)) if both else ": name the one that is")
-        )
+        both = quantity == "voltage" and "displacement" not in map(_quantity, source.titles)
+        ending = OF_TWO_VOLTAGES.format(*(names[i] for i in found)) if both else ": name the one that is"
+        if len({source.names[i] for i in found}) < len(found):
+            ending = f": give the number of the one that is, {' or '.join(str(i + 1) for i in found)}"
+        raise LogError(f"{source.path}: the columns {titles} could all be the {quantity}{ending}")
     if quantity == "time" and source.no_rate:
         raise LogError(
             f"{source.path}: {source.no_rate}; save voltage and displacement at one rate, or give the rate "
@@ -176,7 +195,7 @@ def split_unit(title: str) -> tuple[str, str]:
     """Split ``drive_mV``, ``pos [nm]``, ``t (ms)``, ``x/µm`` into name and unit in lower case."""
     # MATLAB and R write brackets as _ and dots.
     plain = with_u(unicodedata.normalize("NFKC", with_u(title))).strip().rstrip("_.:*")
-    match = re.fullmatch(r"(.+?)\s*(?:[\[({<](\w+)[\])}>]|[-/_\s.]\s*([^\W_]+))", plain)
+    match = re.fullmatch(r"(.+?)\s*(?:[\[({<]\s*(\w+)\s*[\])}>]|[-/_\s.]\s*([^\W_]+))", plain)
     if match is None:
         return plain, ""
     unit = next(group for group in match.groups()[1:] if group).lower()
@@ -185,10 +204,20 @@ def split_unit(title: str) -> tuple[str, str]:
     return plain.replace("_", " "), ""
 
 
-def _states_other_unit(title: str) -> bool:
-    """Whether brackets behind a name hold a word or ``0.1 µm``, and so no known unit, and no other name."""
-    behind = IN_BRACKETS.fullmatch(title.strip())
-    return behind is not None and not any(behind[1].lower() in names for names in NAMES.values())
+def _may_state_a_unit(title: str) -> bool:
+    """Whether something in a title, of which no unit was split off, is one: ``x_nm_raw``, ``u [counts]``."""
+    plain = with_u(unicodedata.normalize("NFKC", with_u(title)))
+    behind = IN_BRACKETS.fullmatch(plain.strip().lower())
+    named = behind is None or CHANNEL.fullmatch(behind[1]) or quantities_called(behind[1])
+    if re.search("[%°]", plain) or not named:
+        return True
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain).lower().replace("_", " ")
+    return any(word in SCALES and not quantities_called(word) for word in re.findall(r"[^\W\d]+", words))
+
+
+def quantities_called(name: str) -> list[str]:
+    """Quantities that have a name, in lower case."""
+    return [quantity for quantity, names in NAMES.items() if name in names]
 
 
 def names_columns(titles: list[str]) -> bool:
@@ -238,7 +267,7 @@ def with_units(names: list[str], below: list[str]) -> list[str]:
     units = [cell.strip(" []()") for cell in below]
     if len(names) != len(units) or not any(units):
         return []
-    of = [_of_unit(unit) for unit in units]
+    of = [quantity_of_unit(unit) for unit in units]
     two = len(set(of) - {None, ""}) > 1
     found = []
     for name, unit, quantity in zip(names, units, of, strict=True):
@@ -253,7 +282,7 @@ def _is_other_unit(text: str) -> bool:
     return len(text) <= 3 and re.search(r"\d", text) is None and _quantity(text) is None
 
 
-def _of_unit(unit: str) -> str | None:
+def quantity_of_unit(unit: str) -> str | None:
     """Quantity that a unit is of; empty for no unit, None for an unknown one."""
     plain = with_u(unit).lower()
     return next((quantity for quantity in NAMES if plain in UNITS[quantity]), None) if plain else ""
@@ -269,12 +298,19 @@ def _factor(source: Source, title: str, quantity: str) -> tuple[float, str]:
     # Only mega would differ from milli by case, and no log has it: units are in lower case here.
     _, unit = split_unit(title)
     base = BASE_UNITS[quantity]
-    if (unit and unit not in UNITS[quantity]) or (not unit and _states_other_unit(title)):
+    if (unit and unit not in UNITS[quantity]) or (not unit and _may_state_a_unit(title)):
         raise LogError(
             f"{source.path}: column {title!r} has no unit of {quantity}, such as {base}: convert it, or say "
             f"what 1 in it stands for: units={{'{quantity}': '2 {base}'}}, or --units {quantity}='2 {base}'"
         )
     if not unit:
+        for other, line in source.stated_units.items():
+            if UNITS[quantity].get(other, 1.0) != 1.0:
+                raise LogError(
+                    f"{source.path}: column {title!r} has no unit, but beside the header stands "
+                    f"{shown(line)!r}: say its unit: units={{'{quantity}': '{other}'}}, or "
+                    f"--units {quantity}={other}"
+                )
         return 1.0, f"column {title!r}: unit taken as {base}"
     return _said(UNITS[quantity][unit], f"column {title!r}", quantity)
 

@@ -4,7 +4,14 @@ import itertools
 import re
 
 from piezoest.records.cells import ONE_GROUP, WORDS, Style, number
-from piezoest.records.columns import UNITS, with_u
+from piezoest.records.columns import (
+    UNITS,
+    quantities_called,
+    quantity_of_unit,
+    split_unit,
+    with_u,
+    with_units,
+)
 from piezoest.records.source import RATES, stated_rate
 
 COMMENTS = ("#", "%")
@@ -12,7 +19,9 @@ COMMENTS = ("#", "%")
 ERRORS = "|".join(re.escape(word) for word in WORDS if word.startswith(COMMENTS))
 COMMENT = rf"(?!(?i:{ERRORS})[^\S\n]*(?:[-+.,;|\d\n]|\Z))[#%]"
 # A line ``sample rate [kHz]: 10`` or ``SAMPLE_TIME = 5e-05``, with the unit beside the name or the number.
-ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.,\deE]+)\s*(\w*)\s*")
+ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.,\deE]+)\s*([^\W\d]\w*)?\s*")
+# The unit of a rate or period in a line of its own.
+UNIT_APART = re.compile(r"(?:rate|fs|period|interval|dt|ts|time)[ _]*units?\W+(\w+)", re.I)
 PERIODS = (
     "dt", "ts", "sample_time", "sampling_time", "sample_period", "sampling_period", "sample_interval", "tinc",
 )  # fmt: skip
@@ -42,11 +51,12 @@ def entries_in(lines: list[list[str]]) -> list[str]:
         for cell, behind in zip(line, [*line[1:], ""], strict=True)
         if not (cell[-1:].isdigit() and behind[:1].isdigit())
     ]
-    found += [
-        f"{line[0]} = {line[1]}"
-        for line in lines
-        if len(line) > 1 and not re.match(r"\d{3}\b", "".join(line[2:3]))
-    ]
+    for line in lines:
+        found.append(" ".join(line))
+        # The unit may have a cell of its own.
+        unit = line[2] if len(line) > 2 and not re.search(r"[^\W\d]", line[1]) else ""
+        if len(line) > 1 and not re.match(r"\d{3}\b", unit):
+            found.append(f"{line[0]} = {line[1]} {unit}")
     for upper, lower in itertools.pairwise(lines):
         found += [f"{name} = {value}" for name, value in zip(upper, lower, strict=False)]
     return found
@@ -56,13 +66,16 @@ def rate_in(comments: list[str], style: Style) -> float | None:
     """Sample rate that comments state [Hz], in numbers as rows write them; None for none, or several."""
     entries = [entry for comment in comments if (entry := ENTRY.fullmatch(bare(comment)))]
     found = {_rate_of(entry, style) for entry in entries} - {None}
-    return found.pop() if len(found) == 1 else None
+    apart = any(unit[1].lower() not in ("hz", "s") for unit in map(UNIT_APART.search, comments) if unit)
+    return found.pop() if len(found) == 1 and not apart else None
 
 
 def _rate_of(entry: re.Match[str], style: Style) -> float | None:
     """Sample rate that an entry states [Hz], itself or by its period; None if it is another entry."""
-    name, unit = entry[1].lower().replace(" ", "_"), with_u(entry[2] or entry[4]).lower()
+    name, unit = entry[1].lower().replace(" ", "_"), with_u(entry[2] or entry[4] or "").lower()
     value = _value(entry[3], style)
+    if entry[2] and entry[4]:
+        return None
     if value is not None and name in RATES:
         return stated_rate(value, unit)
     if value is not None and name in PERIODS and unit in OF_PERIODS:
@@ -78,6 +91,32 @@ def _value(text: str, style: Style) -> float | None:
         return stated_rate(number(text, style))
     except ValueError:
         return stated_rate(text)
+
+
+def units_in(line: str) -> list[str]:
+    """Units that a line states: ``units: s, V, nm``, ``x in nm``, ``position nm``, ``s V nm``."""
+    words = re.findall(r"\d+|[^\W\d_]+", with_u(bare(line)))
+    place = next((k for k, word in enumerate(words) if word.lower() in ("unit", "units", "in")), None)
+    if place is not None:
+        behind = words[place + 1 :] if words[place].lower() != "in" else words[place + 1 : place + 2]
+        return [word for word in behind if quantity_of_unit(word)]
+    if len(words) > 1 and all(map(quantity_of_unit, words)):
+        return words
+    pairs = itertools.pairwise(words)
+    return [unit for name, unit in pairs if quantity_of_unit(unit) in quantities_called(name.lower())]
+
+
+def with_stated_units(names: list[str], lines: list[str]) -> tuple[list[str], dict[str, str]]:
+    """Names without units with those of a line that has one for each; else units of lines, and the lines."""
+    found: dict[str, str] = {}
+    if any(split_unit(name)[1] for name in names):
+        return names, found
+    for line in lines:
+        units = units_in(line)
+        if len(units) == len(names) and (titles := with_units(names, units)):
+            return titles, {}
+        found |= dict.fromkeys((unit.lower() for unit in units), line)
+    return names, found
 
 
 def numbered_names(comments: list[str]) -> list[str]:

@@ -141,7 +141,7 @@ def _numbers(array: Any, start: int, stop: int) -> Any:
 
 
 ONE_FILE = "save all columns in one file, for no other is opened"
-TDMS_UNITS = ("unit_string", "NI_UnitDescription", "unit", "units")
+TDMS_UNITS = ("unit_string", "ni_unitdescription", "unit", "units")
 INCREMENT = "wf_increment"  # time from one sample of a waveform to the next [s]
 
 # ---------------------------------------------------------------- NumPy
@@ -176,7 +176,32 @@ def _held(path: Path, format_: str, arrays: Mapping[str, Any], whole: str = "") 
     )
 
 
+def _words(value: Any) -> list[str]:
+    """Words of an array of text, or of an array that holds such arrays, as MATLAB's cells; else none."""
+    array = np.asarray(value)
+    if array.dtype.kind == "O":
+        words = [_words(each) for each in array.ravel() if not np.asarray(each).dtype.hasobject]
+        return [word for each in words if len(each) == 1 for word in each]
+    return [str(each).strip() for each in array.ravel()] if array.dtype.kind in "U" else []
+
+
+def _with_names(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Columns of the only matrix by their names, if an array beside it has a word for each."""
+    matrices = [name for name, value in arrays.items() if np.ndim(value) == 2 and 1 not in np.shape(value)]
+    matrices = [name for name in matrices if np.asarray(arrays[name]).dtype.kind in "fiu"]
+    if len(matrices) != 1:
+        return arrays
+    matrix = np.asarray(arrays[matrices[0]])
+    columns = matrix.T if matrix.shape[0] > matrix.shape[1] else matrix
+    lists = {tuple(words) for words in map(_words, arrays.values()) if len(set(words)) == len(columns)}
+    if len(lists) != 1:
+        return arrays
+    rest = {name: value for name, value in arrays.items() if name != matrices[0]}
+    return {**rest, **dict(zip(lists.pop(), columns, strict=True))}
+
+
 def _numeric(arrays: Mapping[str, Any], above: str = "") -> Iterator[Named]:
+    arrays = _with_names(arrays)
     for name, value in arrays.items():
         array = np.asarray(value)
         if array.dtype.names:
@@ -184,7 +209,8 @@ def _numeric(arrays: Mapping[str, Any], above: str = "") -> Iterator[Named]:
             fields = {field: array[field].flat[0] if alone else array[field] for field in array.dtype.names}
             yield from _numeric(fields, f"{above}{name}." if alone else "")
         elif array.dtype.kind in "fiu":
-            yield above + name, array, ""
+            unit = next((each for end in ("_unit", "_units") for each in _words(arrays.get(name + end))), "")
+            yield above + name, array, unit
 
 
 # ---------------------------------------------------------------- MATLAB before version 7.3
@@ -215,7 +241,7 @@ def open_hdf5(path: Path) -> Table:
 
 def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
     found: list[Named] = [
-        (name, np.asarray(value), _unit(file.attrs, f"{name}_unit", f"{name}_units"))
+        (name, np.asarray(value), _unit(file.attrs, f"{name}_unit".lower(), f"{name}_units".lower()))
         for name, value in file.attrs.items()
         if name.lower() in RATES and np.size(value) == 1
     ]
@@ -235,6 +261,9 @@ def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
             others = [source.file_name for source in item.virtual_sources() if source.file_name != "."]
         if others:
             raise LogError(f"{path}: {shown(name)} lies in another file, {shown(others[0])}: {ONE_FILE}")
+        scaled = {"scale_factor": 1.0, "add_offset": 0.0}
+        if any(item.attrs.get(key, usual) != usual for key, usual in scaled.items()):
+            raise LogError(f"{path}: {shown(name)} has a scale_factor or add_offset: save it in its own unit")
         check_size(path, int(item.nbytes))
         if item.dtype.names:
             fields = [field for field in item.dtype.names if item.dtype[field].kind in "fiu"]
@@ -247,8 +276,8 @@ def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
 
 
 def _unit(attributes: Any, *keys: str) -> str:
-    """Unit that attributes state under one of the names; empty if none does."""
-    unit = next((attributes[key] for key in keys if key in attributes), "")
+    """Unit that attributes state under one of the names, in lower case; empty if none does."""
+    unit = next((value for key, value in attributes.items() if key.lower() in keys), "")
     return unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)
 
 
@@ -286,15 +315,13 @@ def _in_tdms(file: Any) -> Iterator[Named]:
     rates: set[float | None] = set()
     for name, value in file.properties.items():
         if name.lower() in RATES:
-            yield name, np.asarray(value), ""
+            yield name, np.asarray(value), _unit(file.properties, f"{name}_unit".lower())
     for group in file.groups():
         for channel in group.channels():
             if channel.dtype.kind not in "fiuM" or not len(channel):
                 continue
             stamped = channel.dtype.kind == "M"
-            unit = next(
-                (str(channel.properties[key]) for key in TDMS_UNITS if channel.properties.get(key)), ""
-            )
+            unit = _unit(channel.properties, *TDMS_UNITS)
             yield f"{group.name}/{channel.name}", channel, "s" if stamped else unit
             if not stamped:
                 rates.add(_step(channel))
@@ -329,7 +356,8 @@ class Parquet(Source):
             raise LogError(f"{path}: no columns of numbers in it; there are {', '.join(schema.names)}")
         for key, value in _items(schema):
             if key.decode(errors="replace").lower() in RATES:
-                self.sample_rate = stated_rate(value)
+                unit = next((each for name, each in _items(schema) if name == key + b"_unit"), b"")
+                self.sample_rate = stated_rate(value, unit.decode(errors="replace"))
         super().__init__(path, list(units), [titled(*named) for named in units.items()], len(units))
 
     def count(self, positions: Sequence[int]) -> int:

@@ -2,8 +2,9 @@
 
 import abc
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -47,6 +48,7 @@ class Source(abc.ABC):
     size = 0
     whole = ""
     sample_rate: float | None = None  # [Hz], if the file states it beside the columns
+    stated_units: Mapping[str, str] = MappingProxyType({})  # beside the columns, and where the file says so
     no_rate = ""  # why what it states is no rate for all of them
 
     def __init__(self, path: Path, names: list[str], titles: list[str], width: int) -> None:

@@ -6,8 +6,9 @@ import itertools
 import re
 import warnings
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from piezoest._checks import FloatArray
 from piezoest.records import scopes
 from piezoest.records.cells import MISSING, Marks, Style, is_missing, is_number, number, style_of
 from piezoest.records.columns import names_columns, names_other_order, titled, with_units
-from piezoest.records.comments import bare, entries_in, is_comment, numbered_names, rate_in
+from piezoest.records.comments import bare, entries_in, is_comment, numbered_names, rate_in, with_stated_units
 from piezoest.records.lines import (
     LONGEST_FOOTER,
     Lines,
@@ -37,6 +38,8 @@ HEAD_LINES, STAMP_ROWS = 10_000, 100
 LONGEST_PREAMBLE = 200
 # A name with a unit in brackets, among other words.
 WITH_UNIT = re.compile(r"[^\s,;|]+\s*[\[(][^\s\])]+[\])]")
+# A byte order mark that is not the first, and a blank without width.
+UNSEEN = "\N{ZERO WIDTH NO-BREAK SPACE}\N{ZERO WIDTH SPACE}"
 # Lines that are looked at together.
 PART = 500
 
@@ -57,6 +60,7 @@ class Layout(NamedTuple):
     style: Style  # how numbers are written
     stamps: dict[int, Clock]  # of the columns that hold time stamps
     sample_rate: float | None = None  # that lines above the rows state [Hz]
+    units: Mapping[str, str] = MappingProxyType({})  # that such lines state, and the lines
 
 
 def layout_of(path: Path) -> Layout:
@@ -83,6 +87,7 @@ def layout_of(path: Path) -> Layout:
     elif below := [line for place, line in comments if filled[-len(rows) - 1][0] < place < rows[0][0]]:
         header = with_units(header, _titles(path, bare(below[-1]), delimiter, len(header))) or header
     header = scopes.with_stated_units(header, preamble)
+    header, units = with_stated_units(header, [*above, *map(" ".join, preamble)])
     texts = [line for _, line in rows]
     stamps: dict[int, Clock] = {}
     if any(":" in line or "T" in line for line in texts[:STAMP_ROWS]):
@@ -94,7 +99,7 @@ def layout_of(path: Path) -> Layout:
     style = _style(path, _without_footer(texts, delimiter), delimiter)
     begins = rows[0][0]
     rate = rate_in([*above, *entries_in(preamble), *scopes.entries(preamble)], style)
-    return Layout(path, encoding, delimiter, header, width, begins, skip_blank, style, stamps, rate)
+    return Layout(path, encoding, delimiter, header, width, begins, skip_blank, style, stamps, rate, units)
 
 
 def _delimiter(line: str) -> str:
@@ -102,7 +107,7 @@ def _delimiter(line: str) -> str:
 
 
 def _cells(path: Path, line: str) -> list[str]:
-    return [cell.strip() for cell in split(path, [line], _delimiter(line))[0]]
+    return [cell.strip().strip(UNSEEN) for cell in split(path, [line], _delimiter(line))[0]]
 
 
 def _lines_of_cells(path: Path, lines: list[Numbered]) -> list[list[str]]:
@@ -129,6 +134,9 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
             second = split(path, [filled[1][1]], mark)[0] if mark == " " else head[1]
             if len(header) != len(second):
                 header = _titles(path, filled[0][1], mark, len(second))
+        if header and [row[0] for row in head[1:3]] == ["1", "2"] and len(head[1]) == len(first) + 1:
+            # R writes no name above its column of numbers.
+            header = ["", *first]
         if header and len(head) > 2 and (named := with_units(header, head[1])):
             header, begins = named, 2
         return mark, header, filled[begins:]
@@ -249,7 +257,7 @@ class Text(Source):
     def __init__(self, layout: Layout, names: list[str], titles: list[str]) -> None:
         super().__init__(layout.path, names, titles, layout.width)
         self.layout = layout
-        self.sample_rate = layout.sample_rate
+        self.sample_rate, self.stated_units = layout.sample_rate, layout.units
         self.size = layout.path.stat().st_size
         self._marks: defaultdict[int, Marks] = defaultdict(Marks)
         if layout.style.guessed:
