@@ -20,6 +20,10 @@ WORSE_ON_HELD_OUT = 1.5
 OSCILLATES, FASTER = 0.75, 15.0
 # An error above so many times the noise floor is not noise; on another log, above so many times the one here.
 ABOVE_NOISE, MISSED = 1.3, 3.0
+# Errors below this part of the stroke are what good models leave.
+SMALL = 5e-3
+# So much of the fitted part may be left out at the start without a word.
+SHORT = 0.01
 
 
 def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
@@ -31,7 +35,7 @@ def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
         *delay_sentences(found.delay, found.sample_rate, found.delay_known, found.delay_estimated),
         *_creep(found),
         *_centre(data),
-        *_remainder(found),
+        *_remainder(found, data),
         *_along(found),
         *beyond_sentences("The held-out part", found.learnt_on, held_out, found.sample_rate),
     )
@@ -74,7 +78,7 @@ def other_log_sentences(found: Identification) -> list[str]:
 
 def _left_out(found: Identification) -> list[str]:
     fit, flaws, said = found.fit, found.flaws, []
-    if fit.left_out:
+    if fit.left_out > SHORT * found.trained:
         said.append(unsettled_sentence(fit.left_out / found.sample_rate))
     spikes = int(np.count_nonzero(flaws.spikes[: found.trained])) + fit.spikes
     if spikes:
@@ -85,7 +89,7 @@ def _left_out(found: Identification) -> list[str]:
     if fit.jumps.size:
         said.append(
             f"Beside the motion the displacement jumps {counted(fit.jumps.size)}, first at "
-            f"{float(found.record.time[fit.jumps[0]]):.6g} s: fitted with an offset of its own behind."
+            f"{float(found.record.time[fit.jumps[0]]):.6g} s: fitted with an offset of its own after it."
         )
     return said
 
@@ -116,7 +120,10 @@ def delay_sentences(delay: float, sample_rate: float, known: bool, estimated: bo
 def _creep(found: Identification) -> list[str]:
     if found.creep_known or max(each.creep for each in found.candidates) == 0.0:
         return []
-    has = f"creeps by {100.0 * found.best.creep:.2g} %" if found.best.creep else "has none"
+    creep = found.best.creep
+    has = (
+        "has none" if creep == 0.0 else f"creeps by {f'{100.0 * creep:.2g}' if creep < 1.0 else 'over 100'} %"
+    )
     return [
         "Creep is not known: all swings of the voltage are alike and no rest follows them, so creep looks "
         f"like a wider loop. The model {has}: where the voltage rests it may be off. Record a rest, too."
@@ -139,22 +146,32 @@ def _centre(data: Data) -> list[str]:
     return said
 
 
-def _remainder(found: Identification) -> list[str]:
+def _remainder(found: Identification, data: Data) -> list[str]:
     said = []
     floor, error = found.noise_floor, min(found.best.cross_validated, found.held_out.rms)
-    if error > ABOVE_NOISE * floor:
+    worth_a_word = error > SMALL * float(np.ptp(data.x[data.counts]))
+    if error > ABOVE_NOISE * floor and worth_a_word:
         said.append(
             f"The error ({error:.2g} µm rms) is larger than the noise ({floor:.2g} µm): no model here "
             "explains the rest."
         )
-    if not found.whiteness.is_white:
+    if not found.whiteness.is_white and worth_a_word:
         said.append(
             "The residual is not white: what is left is not noise but what the model cannot do "
             "(creep, drift, rate, minor loops); the standard errors are widened for it."
         )
     said += _oscillation(found)
     odd = _drift(found) or any(each.severity == "doubt" or each.name == "drift" for each in found.findings)
-    if found.held_out.rms > 0.9 * found.line_held_out.rms and found.fit.form != "line" and not odd:
+    if found.fit.form == "line" or found.held_out.rms <= 0.9 * found.line_held_out.rms:
+        return said
+    if found.train.rms < 0.9 * found.line_train.rms:
+        said.append(
+            f"A straight line predicts the held-out part about as well ({found.line_held_out.rms:.2g} µm "
+            f"rms, the model {found.held_out.rms:.2g}), though not the fitted part: do not use this model "
+            "before another log bears it out. The stage or the signal has changed, rings or drifts, or a "
+            "clock is off."
+        )
+    elif not odd:
         said.append("A straight line does about as well: the record shows little hysteresis.")
     return said
 
@@ -173,7 +190,7 @@ def _oscillation(found: Identification) -> list[str]:
 
 
 def _drift(found: Identification) -> list[str]:
-    least = DRIFT_WORTH_A_WORD * found.train.rms
+    least = max(DRIFT_WORTH_A_WORD * found.train.rms, SMALL * float(np.ptp(found.learnt_on.displacement)))
     if abs(found.fit.drift) > least:
         return [
             f"The displacement drifts by about {found.fit.drift:+.2g} µm over the fitted part: fitted beside "

@@ -76,7 +76,7 @@ def check_enough(part: str, log: str, usable: int) -> None:
     if usable < FEWEST_SAMPLES:
         raise ValueError(
             f"the {part} of {log} has {counted(usable, 'usable sample')}, at least {FEWEST_SAMPLES} are "
-            "needed: record longer"
+            "needed: record longer, or with fewer gaps"
         )
 
 
@@ -98,14 +98,14 @@ def check_excitation(data: Data, noise: float, found: Iterable[Finding]) -> None
     if data.extent == 0.0:
         raise ValueError(
             f"too little excitation: the voltage stays at {data.middle:.6g} V over the fitted part, "
-            "it must move the stage up and down"
+            "it must move the stage up and down: cut the rest, or fit a longer part with train=0.9"
         )
     turned = turning_voltages(data)
     if turned.size < FEWEST_TURNS:
         raise ValueError(
             f"too little excitation: over the fitted part the voltage moves by {data.extent:.4g} V but "
             f"turns {counted(turned.size)}, at least {FEWEST_TURNS} are needed: hysteresis shows only at "
-            "turns"
+            "turns: record more swings, or fit a longer part with train=0.9"
         )
     extent = float(np.ptp(data.x[data.counts]))
     if extent == 0.0:

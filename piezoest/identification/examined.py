@@ -17,6 +17,8 @@ from piezoest.signals.turns import TURN, turns
 FEWEST_SAMPLES, FEWEST_TURNS = 50, 2
 # Part of the displacement's scatter that a line in the voltage must not leave, if they belong together.
 UNRELATED = 0.5
+# The voltage moves nothing if it moves less than this part of the displacement's range.
+NOTHING = 1e-3
 
 
 class Examined:
@@ -30,8 +32,8 @@ class Examined:
         self.x = bridged(np.where(self.flaws.unusable, np.nan, record.displacement))
         self.swing = float(np.ptp(self.u))
         # A staircase that is answered late is off by whole steps for as long.
-        stepped = np.ptp(self.x) > 0.0 and goes_in_steps(self.u)
-        self.late = late(self.u, float(delay_of(self.u, self.x)) if stepped else 0.0)
+        self.stepped = bool(np.ptp(self.x) > 0.0 and goes_in_steps(self.u))
+        self.late = late(self.u, float(delay_of(self.u, self.x)) if self.stepped else 0.0)
         self.turns = turns(self.u, TURN * self.swing)
         # The voltage without what drifts; each stretch between jumps has an offset of its own.
         offsets = np.zeros(self.x.size)
@@ -95,8 +97,15 @@ class Examined:
         return float(np.std(self.line[1][self.counts]))
 
     @property
+    def noise(self) -> float:
+        """Standard deviation of the displacement's noise, by how it bends from sample to sample [µm]."""
+        return float(np.median(np.abs(np.diff(self.x, 2)))) / 0.6745 / np.sqrt(6.0)
+
+    @property
     def unexplained(self) -> float:
-        """The same relative to the scatter of the displacement."""
+        """The same relative to the scatter of the displacement; one where the voltage moves nothing."""
+        if self.moved < NOTHING * self.stroke:
+            return 1.0
         return self.off / float(np.std(self.level[self.counts]))
 
     @property

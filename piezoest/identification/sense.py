@@ -27,6 +27,8 @@ RATES, WAVES = (1.0, 1e7), (2e-5, 3600.0)
 CALENDARS, TOO_FAST = ((3e4, 8e4), (7e5, 8e5)), 8e4
 # Part of the stroke by which a loop is open the wrong way, in this part of its branches.
 CLOCKWISE, MOST_BRANCHES = 0.015, 0.8
+# ... and by which it is open wider than that of any stage: some have a quarter.
+WIDE = 0.35
 # Deviation from a straight line, relative to the stroke, that no piezo stage keeps to; a doubtful one.
 STRAIGHT, ALMOST_STRAIGHT = 1e-3, 1e-2
 UNITY = 5e-3
@@ -34,7 +36,10 @@ UNITY = 5e-3
 GOES_ON = 0.08
 FEWEST_LEVELS, FEW_LEVELS = 30.0, 150.0
 MANY_SPIKES = 5e-3
-DRIFT = 0.05
+# Drift, relative to what the voltage moves, that is worth a word; that leaves little of a loop.
+DRIFT, LARGE_DRIFT = 0.05, 0.5
+# The displacement of a clipped voltage goes on by so many times its noise.
+ABOVE_NOISE = 8.0
 
 
 @dataclass(frozen=True)
@@ -157,8 +162,9 @@ def _related(log: Examined) -> Iterator[Finding]:
     if not log.related:
         yield doubt(
             "unrelated",
-            f"A straight line in the voltage leaves {100 * log.unexplained:.0f} % of the displacement: check "
-            "that both columns are of one run and one axis, and that no resonance is excited.",
+            "The displacement hardly follows the voltage: beside a straight line "
+            f"{100 * log.unexplained:.0f} % of its motion is left. Check that both columns are of one run "
+            "and one axis, that no rows are missing in one of them, and that no resonance is excited.",
         )
 
 
@@ -166,7 +172,9 @@ def _size(log: Examined) -> Iterator[Finding]:
     top, gain = float(np.max(np.abs(log.u))), abs(log.gain)
     if top > LARGEST_VOLTAGE:
         yield doubt(
-            "voltage", f"The voltage reaches {top:.4g} V, which no piezo stage bears: mV taken for V?"
+            "voltage",
+            f"The voltage reaches {top:.4g} V, which no piezo stage bears: mV taken for V? "
+            "Give the unit, as in units voltage='mV'; multiply an array by 0.001.",
         )
         return
     said = f"The displacement moves by {log.moved:.3g} µm over {log.swing:.3g} V, {gain:.3g} µm/V"
@@ -178,14 +186,14 @@ def _size(log: Examined) -> Iterator[Finding]:
             f"{STROKES[1]:g} µm): nm taken for µm, or V for mV? Give the unit, as in "
             "units displacement='nm'; multiply an array by 0.001.",
         )
-    elif gain < GAINS[0]:
+    elif gain < GAINS[0] and log.related:
         yield doubt(
             "too small",
             f"{said}, less than piezo stages do (about {GAINS[0]:g} to {GAINS[1]:g} µm/V): mm or m taken "
             "for µm, or volts of the sensor? Give the unit, as in units displacement='mm'; "
             "multiply an array by 1000.",
         )
-    elif log.moved < STROKES[0]:
+    elif log.moved < STROKES[0] and log.related:
         yield note(
             "small stroke",
             f"{said}: so small a stroke shows little hysteresis, check the unit or raise the voltage.",
@@ -206,7 +214,15 @@ def _direction(log: Examined) -> Iterator[Finding]:
             "clockwise",
             f"The loop of displacement over voltage runs clockwise, {-100 * log.loop.opening:.2g} % of the "
             "stroke wide, but that of a stage runs counter-clockwise: voltage and displacement are swapped, "
-            "the displacement's time stamps are early, or the stage swings above its resonance.",
+            "the displacement's time stamps are early, the sensor passes no slow motion, or the stage swings "
+            "above its resonance.",
+        )
+    elif log.loop.opening > WIDE and not log.stepped:
+        yield doubt(
+            "wide loop",
+            f"The loop of displacement over voltage is {100 * log.loop.opening:.0f} % of the stroke wide, "
+            "that of a stage 10 to 25 %: the displacement is late (a delay, a slow sensor or filter), or a "
+            "servo was on. Record more slowly with the servo off, or shift one of the columns.",
         )
 
 
@@ -233,7 +249,7 @@ def _closed_loop(log: Examined) -> Iterator[Finding]:
     feedback = answer(log.u, log.x, log.gain)
     if feedback.closed:
         how = (
-            f"{100 * feedback.explained:.0f} % of the voltage's noise answers the displacement's, "
+            f"{100 * feedback.explained:.0f} % of the voltage's noise follows that of the displacement, "
             f"{counted(feedback.lag, 'sample')} later"
             if feedback.lag
             else f"noise of voltage and displacement go opposite ways (correlation {feedback.together:.2f})"
@@ -255,7 +271,7 @@ def _limits(log: Examined) -> Iterator[Finding]:
     tops = flat_tops(log.u, sign * log.x, GOES_ON) if log.related else ()
     for top in tops[:1]:
         # A rest in which the stage swings once is no limit of the voltage yet.
-        if top.times > 1:
+        if top.times > 1 and top.beyond > ABOVE_NOISE * log.noise:
             yield _clipped(
                 "voltage", "V", top, f"the displacement goes on by up to {top.beyond:.3g} µm",
                 "leave these stretches out, or reduce the voltage.",
@@ -339,12 +355,13 @@ def _drift(log: Examined) -> Iterator[Finding]:
     # Slow ways of the voltage move a stage with a wide loop further than swings do: that is no drift.
     followed = log.stroke * abs(log.trend) / log.swing
     if abs(log.drift) > max(DRIFT * log.moved, followed):
-        share = 100.0 * abs(log.drift) / log.moved
-        yield note(
+        share = abs(log.drift) / log.moved
+        say = doubt if share > LARGE_DRIFT else note
+        yield say(
             "drift",
             f"The displacement drifts by {log.drift:+.3g} µm between the first turn and the last one, "
-            f"{share:.0f} % of what the voltage moves: creep or temperature: let the stage settle, or fit a "
-            "drift beside the model, as identify does.",
+            f"{100.0 * share:.0f} % of what the voltage moves (creep or temperature): let the stage settle. "
+            "identify fits a drift or creep beside the loop, where that predicts better.",
         )
 
 

@@ -139,3 +139,11 @@ def test_a_stage_of_another_gain_or_offset_is_told_apart() -> None:
     assert not any(each.startswith("Other log same") for each in advice)
     assert any(each.startswith("Other log gain") and "misses it" in each for each in advice)
     assert any("only its offset differs, by 2.5 µm" in each for each in advice)
+
+
+def test_a_model_that_predicts_no_better_than_a_line_is_not_to_be_used() -> None:
+    t = np.arange(SWINGS.size) / FS
+    x = LOOP.simulate(SWINGS, allow_jumps=True)
+    found = identify(log(SWINGS, x + np.sin(2.0 * np.pi * t / (0.7 * t[-1]))))
+    assert any("do not use this model" in said for said in found.advice)
+    assert not any("do not use this model" in said for said in identify(log(SWINGS, x)).advice)

@@ -197,7 +197,7 @@ BAD = {
         "(alpha|beta|gamma) = .* known",
     ),
     "falls": (SWINGS, -TRUE.simulate(SWINGS), "falls as the voltage rises"),
-    "even": (SWINGS, 0.1 * np.abs(SWINGS), "leaves .* % of the displacement"),
+    "even": (SWINGS, 0.1 * np.abs(SWINGS), "hardly follows the voltage"),
     "short": (SWINGS[:60], TRUE.simulate(SWINGS[:60]), "part .* 30 usable samples"),
 }
 

@@ -75,3 +75,30 @@ def test_a_sensor_that_ends_at_a_limit_is_clipped(part: float) -> None:
         x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(50.0 + 45.0 * wave, allow_jumps=True)
         x += 3e-3 * rng.standard_normal(4000)
         assert "clipped displacement" in doubts(50.0 + 45.0 * wave, np.minimum(x, np.quantile(x, part)))
+
+
+def test_a_loop_that_is_too_wide_for_a_stage_is_doubted() -> None:
+    u = 50.0 - 50.0 * np.cos(2.0 * np.pi * np.arange(8000) / 1000.0)
+    x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(u, allow_jumps=True)
+    x += 3e-3 * np.random.default_rng(0).standard_normal(x.size)
+    assert doubts(u, x) == []
+    assert "wide loop" in doubts(u[100:], x[:-100])
+
+
+@pytest.mark.parametrize(("drift", "expected"), [(2.0, []), (20.0, ["drift"])])
+def test_a_drift_of_more_than_half_the_stroke_is_doubted(drift: float, expected: list[str]) -> None:
+    t = np.arange(8000) / 1000.0
+    u = 50.0 - 50.0 * np.cos(2.0 * np.pi * t)
+    x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(u, allow_jumps=True) + drift * t / t[-1]
+    assert doubts(u, x) == expected
+
+
+def test_what_the_voltage_does_not_move_is_unrelated() -> None:
+    t = np.arange(8000) / 1000.0
+    assert doubts(50.0 - 50.0 * np.cos(2.0 * np.pi * t), t) == ["unrelated"]
+
+
+def test_noise_of_a_small_swing_is_no_clipped_voltage() -> None:
+    rng = np.random.default_rng(0)
+    u = 0.1 * np.sin(2.0 * np.pi * np.arange(8000) / 1000.0)
+    assert "clipped voltage" not in doubts(np.round(u, 3), 0.08 * u + 1e-3 * rng.standard_normal(u.size))
