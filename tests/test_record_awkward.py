@@ -210,3 +210,11 @@ def test_a_rate_beside_its_unit(tmp_path: Path) -> None:
         file["sample_rate"].attrs["unit"] = "1/min"
     with pytest.raises(ValueError, match="sample rate"):
         read_record(path)
+
+
+@pytest.mark.parametrize(("text", "kind"), [('{"t": 0.0, "u": 1.0}\n', "JSON"), ("<html><table>\n", "HTML")])
+def test_a_text_that_is_no_table(tmp_path: Path, text: str, kind: str) -> None:
+    path = tmp_path / "log.xls"
+    path.write_text(50 * text, encoding="utf-8")
+    with pytest.raises(ValueError, match=f"this is {kind}.*save the log as CSV"):
+        read_record(path)

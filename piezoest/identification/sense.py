@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from piezoest._checks import FloatArray
 from piezoest.fitting.clipping import Top, flat_tops
 from piezoest.fitting.held import repeats
 from piezoest.fitting.runs import BoolArray
@@ -36,6 +37,8 @@ UNITY = 5e-3
 GOES_ON = 0.08
 FEWEST_LEVELS, FEW_LEVELS = 30.0, 150.0
 MANY_SPIKES = 5e-3
+# So many jumps whose sizes differ by no more than this part are those of a reading that wraps.
+MANY_JUMPS, ALIKE = 8, 0.1
 # Drift, relative to what the voltage moves, that is worth a word; that leaves little of a loop.
 DRIFT, LARGE_DRIFT = 0.05, 0.5
 # The displacement of a clipped voltage goes on by so many times its noise.
@@ -323,7 +326,7 @@ def _flaws(log: Examined) -> Iterator[Finding]:
             "jumps",
             f"The displacement jumps {counted(flaws.jumps.size)} without the voltage, by "
             f"{flaws.jump_sizes[largest]:+.3g} µm at {float(log.record.time[flaws.jumps[largest]]):.6g} s: "
-            "give each stretch an offset of its own, as identify does.",
+            f"{_wraps(flaws.jump_sizes)}give each stretch an offset of its own, as identify does.",
         )
     if flaws.dropouts.any():
         yield doubt(
@@ -347,6 +350,14 @@ def _flaws(log: Examined) -> Iterator[Finding]:
             f"The voltage rests {counted(len(flaws.rests))}, {rested:.3g} s in all: nothing is learnt of the "
             "loop there, and creep shows.",
         )
+
+
+def _wraps(sizes: FloatArray) -> str:
+    """What to add where all of many jumps are of one size."""
+    size = np.abs(sizes)
+    if size.size < MANY_JUMPS or np.ptp(size) > ALIKE * np.mean(size):
+        return ""
+    return "as all have one size, an interferometer or a counter may wrap: unwrap the column, or "
 
 
 def _drift(log: Examined) -> Iterator[Finding]:

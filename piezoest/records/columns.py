@@ -241,6 +241,16 @@ def names_other_order(titles: list[str]) -> bool:
     return elsewhere and len(set(places.values())) == len(places) > 1 and LITTLE_WORDS.isdisjoint(names)
 
 
+def counted_names(cells: list[str], below: list[list[str]]) -> list[str] | None:
+    """Names of columns that pandas only counts: none for 0, 1, 2; all if an index stands before them."""
+    numbers = [str(k) for k in range(len(cells))]
+    if not any("." in cell for row in below for cell in row):
+        return None
+    if cells[:1] == [""] and cells[1:] == numbers[:-1]:
+        return cells
+    return [] if cells == numbers else None
+
+
 def _quantity(title: str) -> str | None:
     """Quantity that a title stands for, by its name or else by its unit."""
     name, unit = split_unit(title)

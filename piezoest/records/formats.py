@@ -159,9 +159,7 @@ def open_npz(path: Path) -> Table:
     with damaged(path, "NumPy"), zipfile.ZipFile(path) as packed:
         parts = packed.infolist()
     if any(not part.filename.endswith(".npy") for part in parts):
-        raise LogError(
-            f"{path}: this is no NumPy file but another archive, such as a spreadsheet: save the log as CSV"
-        )
+        raise LogError(f"{path}: this is an archive but none of NumPy: unpack it, or save the log as CSV")
     check_size(path, sum(part.file_size for part in parts))
     # NumPy leaves a file that it opened open where the archive is damaged.
     with damaged(path, "NumPy"), path.open("rb") as file, np.load(file, allow_pickle=False) as archive:

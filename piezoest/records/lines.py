@@ -106,6 +106,14 @@ def encoding_of(path: Path) -> str:
     return "utf-8-sig"
 
 
+def check_table(path: Path, first: str) -> None:
+    """Refuse a text whose first line, without blanks at its ends, is that of no table."""
+    kinds = {"{": "JSON", "[{": "JSON", "[[": "JSON", "<": "HTML or XML"}
+    kind = next((kind for sign, kind in kinds.items() if first.startswith(sign)), "")
+    if kind:
+        raise LogError(f"{path}: this is {kind}, no table: save the log as CSV")
+
+
 def chunks(path: Path, encoding: str, rows: int) -> Iterator[tuple[int, str, int]]:
     """Whole lines, of about so many rows at most: number of the first, text, bytes read so far."""
     size = min(max(BYTES_OF_A_ROW * rows, FEWEST_BYTES), MOST_BYTES)

@@ -16,11 +16,12 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.records import scopes
 from piezoest.records.cells import MISSING, Marks, Style, is_missing, is_number, number, style_of
-from piezoest.records.columns import names_columns, names_other_order, titled, with_units
+from piezoest.records.columns import counted_names, names_columns, names_other_order, titled, with_units
 from piezoest.records.comments import bare, entries_in, is_comment, numbered_names, rate_in, with_stated_units
 from piezoest.records.lines import (
     LONGEST_FOOTER,
     Lines,
+    check_table,
     chunks,
     encoding_of,
     end_of_rows,
@@ -76,6 +77,7 @@ def layout_of(path: Path) -> Layout:
     filled = [(place, line) for place, line in head if line.strip()]
     if not filled:
         raise LogError(f"{path}: the file is empty")
+    check_table(path, filled[0][1].strip())
     between = sum(filled[0][0] < place < filled[-1][0] for place, line in head if not line.strip())
     delimiter, header, rows = _table(path, filled)
     if not rows:
@@ -126,7 +128,7 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
     like_first &= begins < 2 or names_columns(first) or not names_columns(head[begins - 1])
     if begins < 2 or like_first or len(head) < min(len(filled), LONGEST_PREAMBLE):
         header, begins = ([], 0) if _is_row_of_numbers(first) else (first, 1)
-        if (counted := _counted(first, head[1:2])) is not None:
+        if (counted := counted_names(first, head[1:2])) is not None:
             header, begins = counted, 1
         if header and len(head) > 1:
             # Numbers with decimal commas may be parted by blanks, and rows otherwise than names.
@@ -188,16 +190,6 @@ def _is_row_of_numbers(cells: list[str]) -> bool:
     """Whether all cells are numbers, or most beside a text behind them."""
     known = [is_number(cell) for cell in cells]
     return all(known) or (known[0] and cells[0] != "" and 2 * sum(known) > len(cells))
-
-
-def _counted(cells: list[str], below: list[list[str]]) -> list[str] | None:
-    """Names of columns that pandas only counts: none for 0, 1, 2; all if an index stands before them."""
-    numbers = [str(k) for k in range(len(cells))]
-    if not any("." in cell for row in below for cell in row):
-        return None
-    if cells[:1] == [""] and cells[1:] == numbers[:-1]:
-        return cells
-    return [] if cells == numbers else None
 
 
 def _numeric(*rows: list[str]) -> bool:

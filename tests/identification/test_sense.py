@@ -102,3 +102,10 @@ def test_noise_of_a_small_swing_is_no_clipped_voltage() -> None:
     rng = np.random.default_rng(0)
     u = 0.1 * np.sin(2.0 * np.pi * np.arange(8000) / 1000.0)
     assert "clipped voltage" not in doubts(np.round(u, 3), 0.08 * u + 1e-3 * rng.standard_normal(u.size))
+
+
+def test_many_jumps_of_one_size_are_those_of_a_reading_that_wraps() -> None:
+    u = 50.0 - 50.0 * np.cos(2.0 * np.pi * np.arange(8000) / 1000.0)
+    x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(u, allow_jumps=True)
+    said = {each.name: each.sentence for each in findings(Record.from_arrays(u, np.mod(x, 1.0), 1000.0))}
+    assert "wrap" in said["jumps"]
