@@ -107,6 +107,13 @@ def test_a_delay_is_found_where_the_voltage_has_several_frequencies(delay: float
     assert found.delay_estimated
 
 
+def test_creep_of_several_amplitudes_is_no_delay() -> None:
+    t = np.arange(10_000) / 1000.0
+    u = 30.0 - 30.0 * np.interp(t % 5.0, [0.0, 2.5, 5.0], [1.0, 0.3, 1.0]) * np.cos(2.0 * np.pi * t)
+    x = pz.PaperStage(sample_rate=1000.0, seed=1).run(u)
+    assert pz.fit(u, x, sample_rate=1000.0, model="plays-creep", delay="auto").delay < 0.5
+
+
 @pytest.mark.slow
 def test_creep_is_found() -> None:
     u, x, sigma = drawn(5, creep=pz.Creep([0.05], [0.5]))
