@@ -41,13 +41,16 @@ FLATTEST = 0.3
 # Where no line explains the points, the stage goes too far from this multiple of the line's way on: the first
 # if the voltage was at a limit, else the second.
 FARTHER, MUCH_FARTHER = 1.5, 2.5
+# ... by so many times the first gain at most, unless the voltage was at a limit: with still less voltage the
+# stage would hardly follow.
+STEEPEST = 4.0
 # ... and not far enough below this multiple, if it goes less than half as far as the reference: the mean
 # square of an even motion over a length is its square / 12.
 EVEN = 12.0
-NEARER, STANDS = 0.4, 0.5**2 / EVEN
+NEARER, STANDS = 0.7, 0.5**2 / EVEN
 # After a leg, the length KEPT (longest - leg) + LEFT leg of those before it still counts. At each turn the
 # longest recent leg is multiplied by FADES.
-LEFT, KEPT, FADES = 1.0 / 3.0, 2.0, 0.95
+LEFT, KEPT, FADES = 1.0 / 3.0, 2.0, 0.9
 # Before so many legs only the last two count: the first may lead from rest to the reference. If the mean
 # square of the first of the two is so many times larger, it does not count either.
 SETTLED, UNLIKE = 4.0, 6.0
@@ -167,7 +170,8 @@ def _draw(line: Any, points: Any, leg: Any, most: Any) -> None:
             line.gain = CHANGE * line.first_gain
     elif square_x > farther * farther * square > 0.0:
         # Late or ringing, the stage goes much farther than the line says: less voltage is safe.
-        line.gain *= most
+        steepest = np.inf if line.clipped != 0.0 else STEEPEST * line.first_gain / line.gain
+        line.gain *= min(most, max(steepest, 1.0))
     elif square_x < nearer * nearer * square and square_x < STANDS * leg * leg and steeper:
         # The stage hardly moves: what made the line steeper, such as ringing, is over.
         line.gain = np.sign(line.gain) * max(np.abs(line.gain) / most, np.abs(line.first_gain))

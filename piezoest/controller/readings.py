@@ -165,7 +165,9 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> b
     weakest = WEAK if sure or not straight else (1.0 / HUGE if line.legs >= TRUSTED else 0.0)
     if known:
         readings.weak = _counted(readings.weak, share * swings, answer < weakest)
-    wrong = known and explained > SIGNED and slope < WRONG
+    # A line that is not sure may also be far too steep, so that the stage hardly answers.
+    opposite = slope < WRONG or (not sure and straight and slope < -1.0 / HUGE)
+    wrong = known and explained > SIGNED and opposite
     share = 1.0 if sure else WRONG_FOR / REFUTED_FOR
     readings.wrong = _counted(readings.wrong, share * swings, wrong)
     # Readings that are far too large look like noise.

@@ -12,19 +12,20 @@ from piezoest.controller import travel as travels
 from piezoest.layout import AMOUNT, COUNT, MEASURED, record
 
 # Samples since the reference began to rest but for noise, zero if it does not; their mean; the mean square of
-# their distances from it.
-STILL = record(count=COUNT, mean=MEASURED, square=AMOUNT)
+# the noise; the last value.
+STILL = record(count=COUNT, mean=MEASURED, square=AMOUNT, last=MEASURED)
 # Weight of a sample in the mean square, and the least one in the mean: a reference may drift.
 SLOWEST = 1e-3
 # The rest is over where the reference is so many standard deviations away. At first the standard deviation is
-# taken to be this part of the way to and fro.
-DEVIATIONS, FIRST = 6.0, 0.25
+# taken to be this part of the way to and fro, which counts as so many samples.
+DEVIATIONS, FIRST, SOON = 6.0, 0.25, 16.0
 
 
 @register_jitable
 def held(state: Any, r: Any) -> float:
     """The reference, or its mean while it rests but for noise."""
     still, reference = state.still, state.reference
+    step, still.last = r - still.last, r
     if still.count == 0.0:
         if not travels.trembles(reference):
             return r
@@ -36,5 +37,6 @@ def held(state: Any, r: Any) -> float:
     still.count += 1.0
     share = max(1.0 / still.count, SLOWEST)
     still.mean += share * off
-    still.square += SLOWEST * (off * off - still.square)
+    # By steps, which have twice the mean square of the noise: slow motion is none.
+    still.square += max(1.0 / (still.count + SOON), SLOWEST) * (0.5 * step * step - still.square)
     return still.mean

@@ -14,13 +14,13 @@ from piezoest.layout import COUNT, DISTANCE, FLAG, MEASURED, SIGN, record
 # one before two turns; turns so far, the last value, whether it has just turned; samples of this leg, those
 # since it went on clearly, those of the last leg, and of the leg before; the farthest way back since it went
 # on, the path to and fro since then, and where that was; the largest recent change from sample to sample; the
-# recent extremes; whether this leg and the last one are each no longer than the leg before, and whether the
-# last two were about as long as each other.
+# recent extremes, and the widest swing, forgotten more slowly; whether this leg and the last one are each no
+# longer than the leg before, and whether the last two were about as long as each other.
 TRAVEL = record(
     direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE, swing=DISTANCE, least=DISTANCE,
     turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, waits=COUNT, usual=COUNT,
     past=COUNT, back=DISTANCE, path=DISTANCE, mark=MEASURED, fastest=DISTANCE, highest=MEASURED,
-    lowest=MEASURED, nested=FLAG, alike=FLAG,
+    lowest=MEASURED, wide=DISTANCE, nested=FLAG, alike=FLAG,
 )  # fmt: skip
 
 # A way back of TURN swings is a turn. Before SHOWN turns a smaller one is: the first way may lead to a bias
@@ -41,8 +41,9 @@ MANY, TREMBLES = 64.0, 4e-3
 # No swing is below this fraction of the last one: noise at rest would be a swing.
 LEAST = 0.02
 # At each turn the largest recent change is multiplied by SLOWER, and the extremes come nearer to the present
-# leg by FADES of the distance.
-SLOWER, FADES = 0.7, 0.1
+# leg by FADES of the distance. The widest swing for the corridor is multiplied by NARROWER: a line that has
+# seen wide legs comes to the small ones behind them more slowly than these extremes do.
+SLOWER, FADES, NARROWER = 0.7, 0.1, 0.95
 
 
 @register_jitable
@@ -50,7 +51,7 @@ def begin(travel: Any, value: Any, least: Any) -> None:
     """Begin, or start again, at a value; no swing is smaller than `least` before two turns."""
     travel.mark = travel.furthest = travel.turned = travel.last = travel.highest = travel.lowest = value
     travel.direction = travel.leg = travel.turns = travel.back = travel.path = 0.0
-    travel.count = travel.waits = travel.usual = travel.past = travel.fastest = 0.0
+    travel.count = travel.waits = travel.usual = travel.past = travel.fastest = travel.wide = 0.0
     travel.swing = travel.least = least
 
 
@@ -58,6 +59,12 @@ def begin(travel: Any, value: Any, least: Any) -> None:
 def are_alike(one: Any, other: Any, least: Any) -> bool:
     """Whether the shorter one of two lengths is at least this part of the longer one."""
     return min(one, other) >= least * max(one, other)
+
+
+@register_jitable
+def widest(travel: Any) -> float:
+    """The widest recent swing: smaller ones do not erase what it has left."""
+    return max(travel.swing, travel.highest - travel.lowest)
 
 
 @register_jitable
@@ -89,6 +96,7 @@ def follow(travel: Any, value: Any) -> float:
         travel.count = travel.waits = travel.back = travel.path = 0.0
         travel.nested = 1.0 if leg <= (1.0 + LONGER) * travel.leg else 0.0
         travel.alike = 1.0 if are_alike(leg, travel.leg, ALIKE) else 0.0
+        travel.wide = max(NARROWER * travel.wide, widest(travel))
         travel.swing, travel.leg = swing, leg
         travel.turned = travel.furthest
         travel.furthest = travel.mark = value
@@ -112,7 +120,9 @@ def _smallest(travel: Any, noise: Any) -> float:
 @register_jitable
 def _is_jagged(travel: Any) -> bool:
     """Whether the motion to and fro is noise, by how far it goes from sample to sample."""
-    return travel.path > JAGGED * travel.waits * travel.back
+    # The way forth to a smooth turn is none to and fro.
+    fro = travel.path - np.abs(travel.furthest - travel.mark)
+    return fro > JAGGED * travel.waits * travel.back
 
 
 @register_jitable
@@ -129,12 +139,6 @@ def narrow(travel: Any, waits: Any, least: Any) -> None:
     """Start again with a small swing, at the last value; a leg may take `waits` samples."""
     begin(travel, travel.last, least)
     travel.usual = waits
-
-
-@register_jitable
-def widest(travel: Any) -> float:
-    """The widest recent swing: smaller ones do not erase what it has left."""
-    return max(travel.swing, travel.highest - travel.lowest)
 
 
 @register_jitable

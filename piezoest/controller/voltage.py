@@ -73,7 +73,7 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
         wanted = min(max(wanted, state.u + ahead - most), state.u + ahead + most)
     if not np.abs(wanted) < WILDEST:
         wanted = straight
-    half_swing = np.abs(0.5 * max(swing, travels.widest(state.reference)) / line.gain)
+    half_swing = np.abs(0.5 * max(swing, travels.widest(state.reference), state.reference.wide) / line.gain)
     # No model can be better than the line by more than the line has missed recently.
     missed = np.abs(state.unit) * state.widest + 3.0 * np.sqrt(state.readings.noise)
     room = min(settings.corridor * half_swing, WIDER * missed / np.abs(line.gain))

@@ -94,6 +94,18 @@ def test_a_line_that_became_too_steep_comes_back_where_little_moves(answer: floa
     assert line.gain == pytest.approx(gain, rel=0.2)
 
 
+def test_ringing_does_not_make_the_line_so_steep_that_nothing_moves() -> None:
+    line = fresh()
+    first = line.gain
+    for k in range(12):
+        direction = 1.0 - 2.0 * (k % 2)
+        for phase in np.linspace(0.0, np.pi, 50):
+            u = -0.5 * direction * np.cos(phase) / line.gain
+            lines.add(line.now, u, 20.0 * np.sin(7.3 * phase + k), 1e9)
+        lines.turn(line, direction, 1.0)
+    assert first < line.gain < 5.0 * first
+
+
 def test_no_dead_zone_makes_the_line_flat() -> None:
     line = fresh()
     for k in range(20):

@@ -10,6 +10,8 @@ from scipy.signal import lfilter
 import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo.families import Reach, draw_family
+from piezoest.controller import travel as travels
+from piezoest.layout import Named, new
 from tests.controller import shared
 from tests.controller.shared import LIMITS, drive, in_blocks, last_error
 
@@ -94,6 +96,39 @@ def test_steps_up_and_one_step_back_show_the_gain() -> None:
     settled = np.flatnonzero(np.arange(r.size) % 400 > 100)[-4000:]
     slope = np.polyfit(run.u[settled], run.x[settled], 1)[0]
     assert float(driver.state["line"]["gain"]) == pytest.approx(slope, rel=0.06)
+
+
+@pytest.mark.parametrize("family", ["preisach", "coleman-hodgdon", "relays"])
+@pytest.mark.parametrize("bias", [0.0, 3.0])
+def test_small_waves_behind_wide_ones_stay_within_the_corridor(family: str, bias: float) -> None:
+    """The corridor must not become narrow before the line has come to where the small waves are."""
+    model = draw_family(family, np.random.default_rng(3), Reach(-100.0, 100.0), width=0.14, gain=0.1)
+    small = bias + pz.signals.sine(0.25, 5.0, 25, FS).values
+    r = np.concatenate((EIGHT, np.linspace(EIGHT[-1], bias, 300), small))
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
+    x = in_blocks(driver, pz.SimulatedStage(FS, model, gauge=pz.Gauge(noise=3e-4), seed=1), r, 10)[1]
+    assert np.abs(r - x)[-9000:].max() < 0.025
+
+
+def test_a_smooth_step_behind_a_wide_way_is_no_noise_of_a_rest() -> None:
+    """Near its top it hardly moves; held at its mean, it would be followed late afterwards."""
+    noise = 3e-3 * np.random.default_rng(0).standard_normal(3000)
+    pole = np.exp(0.02 * (-0.7 + 1j * np.sqrt(1.0 - 0.7**2)))
+    step = lfilter([abs(1.0 - pole) ** 2], [1.0, -2.0 * pole.real, abs(pole) ** 2], np.full(3000, 0.3))
+    for dither, rests in ((0.0, False), (noise, True)):
+        travel = Named(new(travels.TRAVEL), travels.TRAVEL)
+        travels.begin(travel, 0.0, 0.1)
+        r = np.concatenate((np.linspace(0.0, 25.0, 200), 25.0 + step + dither))
+        assert any(travels.trembles(travel) for value in r if travels.follow(travel, value) >= 0.0) == rests
+
+
+def test_a_reference_that_leaves_a_rest_slowly_is_not_held() -> None:
+    """Its noise is known by its steps: its distance from the mean grows with the motion itself."""
+    t = np.arange(60_000) / FS
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+    r = np.concatenate((EIGHT, noise[:10_000], 0.25 * np.sin(2.0 * np.pi * 0.5 * t) + noise))
+    off = np.abs(r - driven(r, noisy(3e-4))[1].x)
+    assert off[-20_000:].max() < 0.03
 
 
 @pytest.mark.parametrize("noise", [0.003, 0.006])
