@@ -205,7 +205,10 @@ def test_a_rate_beside_its_unit(tmp_path: Path) -> None:
         file["voltage"], file["position"] = ([row[k] for row in ROWS] for k in (1, 2))
         file["sample_rate"] = 2.0
         file["sample_rate"].attrs["unit"] = "kHz"
-    assert read_record(path).sample_rate == 2000.0
+        file["position"].attrs["scale_factor"], file["position"].attrs["add_offset"] = 2.0, 1.0
+    record = read_record(path)
+    assert record.sample_rate == 2000.0
+    np.testing.assert_allclose(record.displacement, [2.0 * row[2] + 1.0 for row in ROWS])
     with h5py.File(path, "a") as file:
         file["sample_rate"].attrs["unit"] = "1/min"
     with pytest.raises(ValueError, match="sample rate"):

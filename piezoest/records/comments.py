@@ -65,9 +65,10 @@ def entries_in(lines: list[list[str]]) -> list[str]:
 def rate_in(comments: list[str], style: Style) -> float | None:
     """Sample rate that comments state [Hz], in numbers as rows write them; None for none, or several."""
     entries = [entry for comment in comments if (entry := ENTRY.fullmatch(bare(comment)))]
+    if any(unit[1].lower() not in ("hz", "s") for unit in map(UNIT_APART.search, comments) if unit):
+        entries = [entry for entry in entries if entry[2] or entry[4]]
     found = {_rate_of(entry, style) for entry in entries} - {None}
-    apart = any(unit[1].lower() not in ("hz", "s") for unit in map(UNIT_APART.search, comments) if unit)
-    return found.pop() if len(found) == 1 and not apart else None
+    return found.pop() if len(found) == 1 else None
 
 
 def _rate_of(entry: re.Match[str], style: Style) -> float | None:

@@ -114,6 +114,21 @@ class _Part(NamedTuple):
         return self.matrix[part, self.place] if self.axis == 0 else self.matrix[self.place, part]
 
 
+class _Packed(NamedTuple):
+    """Numbers that a file holds as others, as netCDF does: number = factor stored + offset."""
+
+    stored: Any
+    factor: Any
+    offset: Any
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return tuple(self.stored.shape)
+
+    def __getitem__(self, part: Any) -> Any:
+        return self.stored[part] * self.factor + self.offset
+
+
 def _shape(values: Any) -> tuple[int, ...]:
     return tuple(values.shape) if hasattr(values, "shape") else (len(values),)
 
@@ -140,6 +155,7 @@ def _numbers(array: Any, start: int, stop: int) -> Any:
     return floats(pd.Series(values), pd.Timestamp(array[0:1][0]))
 
 
+PACKING = (("scale_factor", 1.0), ("add_offset", 0.0))
 ONE_FILE = "save all columns in one file, for no other is opened"
 TDMS_UNITS = ("unit_string", "ni_unitdescription", "unit", "units")
 INCREMENT = "wf_increment"  # time from one sample of a waveform to the next [s]
@@ -259,15 +275,14 @@ def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
             others = [source.file_name for source in item.virtual_sources() if source.file_name != "."]
         if others:
             raise LogError(f"{path}: {shown(name)} lies in another file, {shown(others[0])}: {ONE_FILE}")
-        scaled = {"scale_factor": 1.0, "add_offset": 0.0}
-        if any(item.attrs.get(key, usual) != usual for key, usual in scaled.items()):
-            raise LogError(f"{path}: {shown(name)} has a scale_factor or add_offset: save it in its own unit")
         check_size(path, int(item.nbytes))
         if item.dtype.names:
             fields = [field for field in item.dtype.names if item.dtype[field].kind in "fiu"]
             found.extend((f"{name}/{field}", item.fields(field), "") for field in fields)
         elif item.dtype.kind in "fiu" and item.attrs.get("MATLAB_class") not in (b"char", "char"):
-            found.append((name, item, _unit(item.attrs, "unit", "units")))
+            factor, offset = (item.attrs.get(key, usual) for key, usual in PACKING)
+            values = item if (factor, offset) == (1.0, 0.0) else _Packed(item, factor, offset)
+            found.append((name, values, _unit(item.attrs, "unit", "units")))
 
     file.visititems(visit)
     return found
@@ -275,7 +290,8 @@ def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
 
 def _unit(attributes: Any, *keys: str) -> str:
     """Unit that attributes state under one of the names, in lower case; empty if none does."""
-    unit = next((value for key, value in attributes.items() if key.lower() in keys), "")
+    stated = {key.lower(): value for key, value in attributes.items()}
+    unit = next((stated[key] for key in keys if key in stated and np.size(stated[key]) and stated[key]), "")
     return unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)
 
 
@@ -348,14 +364,12 @@ class Parquet(Source):
             if types.is_timestamp(field.type) or types.is_duration(field.type):
                 units[field.name] = "s"
             elif types.is_integer(field.type) or types.is_floating(field.type):
-                stated = {key.lower(): value.decode(errors="replace") for key, value in _items(field)}
-                units[field.name] = stated.get(b"unit") or stated.get(b"units") or ""
+                units[field.name] = _unit(_items(field), "unit", "units")
         if not units:
             raise LogError(f"{path}: no columns of numbers in it; there are {', '.join(schema.names)}")
-        for key, value in _items(schema):
-            if key.decode(errors="replace").lower() in RATES:
-                unit = next((each for name, each in _items(schema) if name == key + b"_unit"), b"")
-                self.sample_rate = stated_rate(value, unit.decode(errors="replace"))
+        stated = _items(schema)
+        for name in stated.keys() & RATES:
+            self.sample_rate = stated_rate(stated[name], _unit(stated, f"{name}_unit"))
         super().__init__(path, list(units), [titled(*named) for named in units.items()], len(units))
 
     def count(self, positions: Sequence[int]) -> int:
@@ -382,5 +396,5 @@ class Parquet(Source):
                 start = stop
 
 
-def _items(described: Any) -> Any:
-    return (described.metadata or {}).items()
+def _items(described: Any) -> dict[str, bytes]:
+    return {key.decode(errors="replace").lower(): value for key, value in (described.metadata or {}).items()}
