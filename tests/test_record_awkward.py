@@ -221,3 +221,16 @@ def test_a_text_that_is_no_table(tmp_path: Path, text: str, kind: str) -> None:
     path.write_text(50 * text, encoding="utf-8")
     with pytest.raises(ValueError, match=f"this is {kind}.*save the log as CSV"):
         read_record(path)
+
+
+def test_names_and_units_in_attributes_of_a_matrix(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    t, u, x = np.transpose(ROWS)
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["data"] = np.column_stack([1e3 * t, 1e3 * x, u])
+        file["data"].attrs["columns"] = ["time", "position", "voltage"]
+        file["data"].attrs["Units"] = ["ms", "nm", "V"]
+    record = read_record(tmp_path / "log.h5")
+    assert record.sample_rate == pytest.approx(1000.0)
+    np.testing.assert_allclose(record.voltage, u)
+    np.testing.assert_allclose(record.displacement, x)

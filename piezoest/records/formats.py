@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest import _extras
+from piezoest.records.beside import NAMES, UNITS, stated, unit_of, with_names, words_of
 from piezoest.records.columns import titled
 from piezoest.records.source import (
     EXTRA,
@@ -190,32 +191,8 @@ def _held(path: Path, format_: str, arrays: Mapping[str, Any], whole: str = "") 
     )
 
 
-def _words(value: Any) -> list[str]:
-    """Words of an array of text, or of an array that holds such arrays, as MATLAB's cells; else none."""
-    array = np.asarray(value)
-    if array.dtype.kind == "O":
-        words = [_words(each) for each in array.ravel() if not np.asarray(each).dtype.hasobject]
-        return [word for each in words if len(each) == 1 for word in each]
-    return [str(each).strip() for each in array.ravel()] if array.dtype.kind in "U" else []
-
-
-def _with_names(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Columns of the only matrix by their names, if an array beside it has a word for each."""
-    matrices = [name for name, value in arrays.items() if np.ndim(value) == 2 and 1 not in np.shape(value)]
-    matrices = [name for name in matrices if np.asarray(arrays[name]).dtype.kind in "fiu"]
-    if len(matrices) != 1:
-        return arrays
-    matrix = np.asarray(arrays[matrices[0]])
-    columns = matrix.T if matrix.shape[0] > matrix.shape[1] else matrix
-    lists = {tuple(words) for words in map(_words, arrays.values()) if len(set(words)) == len(columns)}
-    if len(lists) != 1:
-        return arrays
-    rest = {name: value for name, value in arrays.items() if name != matrices[0]}
-    return {**rest, **dict(zip(lists.pop(), columns, strict=True))}
-
-
 def _numeric(arrays: Mapping[str, Any], above: str = "") -> Iterator[Named]:
-    arrays = _with_names(arrays)
+    arrays = with_names(arrays)
     for name, value in arrays.items():
         array = np.asarray(value)
         if array.dtype.names:
@@ -223,7 +200,9 @@ def _numeric(arrays: Mapping[str, Any], above: str = "") -> Iterator[Named]:
             fields = {field: array[field].flat[0] if alone else array[field] for field in array.dtype.names}
             yield from _numeric(fields, f"{above}{name}." if alone else "")
         elif array.dtype.kind in "fiu":
-            unit = next((each for end in ("_unit", "_units") for each in _words(arrays.get(name + end))), "")
+            unit = next(
+                (each for end in ("_unit", "_units") for each in words_of(arrays.get(name + end))), ""
+            )
             yield above + name, array, unit
 
 
@@ -253,9 +232,19 @@ def open_hdf5(path: Path) -> Table:
     )
 
 
+def _columns_of(name: str, values: Any, names: list[str], units: list[str]) -> list[Named]:
+    """A dataset, or its columns where attributes have a name or a unit for each of them."""
+    columns = [each for _, each, _ in _columns([(name, values, "")])]
+    if len(columns) > 1 and len(columns) in (len(names), len(units)):
+        names = names if len(names) == len(columns) else [f"{name}:{k}" for k in range(1, len(columns) + 1)]
+        units = units if len(units) == len(columns) else [""] * len(columns)
+        return list(zip(names, columns, units, strict=True))
+    return [(name, values, units[0] if len(units) == 1 else "")]
+
+
 def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
     found: list[Named] = [
-        (name, np.asarray(value), _unit(file.attrs, f"{name}_unit".lower(), f"{name}_units".lower()))
+        (name, np.asarray(value), unit_of(file.attrs, f"{name}_unit".lower(), f"{name}_units".lower()))
         for name, value in file.attrs.items()
         if name.lower() in RATES and np.size(value) == 1
     ]
@@ -282,17 +271,10 @@ def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
         elif item.dtype.kind in "fiu" and item.attrs.get("MATLAB_class") not in (b"char", "char"):
             factor, offset = (item.attrs.get(key, usual) for key, usual in PACKING)
             values = item if (factor, offset) == (1.0, 0.0) else _Packed(item, factor, offset)
-            found.append((name, values, _unit(item.attrs, "unit", "units")))
+            found.extend(_columns_of(name, values, stated(item.attrs, *NAMES), stated(item.attrs, *UNITS)))
 
     file.visititems(visit)
     return found
-
-
-def _unit(attributes: Any, *keys: str) -> str:
-    """Unit that attributes state under one of the names, in lower case; empty if none does."""
-    stated = {key.lower(): value for key, value in attributes.items()}
-    unit = next((stated[key] for key in keys if key in stated and np.size(stated[key]) and stated[key]), "")
-    return unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)
 
 
 # ---------------------------------------------------------------- TDMS
@@ -329,13 +311,13 @@ def _in_tdms(file: Any) -> Iterator[Named]:
     rates: set[float | None] = set()
     for name, value in file.properties.items():
         if name.lower() in RATES:
-            yield name, np.asarray(value), _unit(file.properties, f"{name}_unit".lower())
+            yield name, np.asarray(value), unit_of(file.properties, f"{name}_unit".lower())
     for group in file.groups():
         for channel in group.channels():
             if channel.dtype.kind not in "fiuM" or not len(channel):
                 continue
             stamped = channel.dtype.kind == "M"
-            unit = _unit(channel.properties, *TDMS_UNITS)
+            unit = unit_of(channel.properties, *TDMS_UNITS)
             yield f"{group.name}/{channel.name}", channel, "s" if stamped else unit
             if not stamped:
                 rates.add(_step(channel))
@@ -364,12 +346,12 @@ class Parquet(Source):
             if types.is_timestamp(field.type) or types.is_duration(field.type):
                 units[field.name] = "s"
             elif types.is_integer(field.type) or types.is_floating(field.type):
-                units[field.name] = _unit(_items(field), "unit", "units")
+                units[field.name] = unit_of(_items(field), *UNITS)
         if not units:
             raise LogError(f"{path}: no columns of numbers in it; there are {', '.join(schema.names)}")
-        stated = _items(schema)
-        for name in stated.keys() & RATES:
-            self.sample_rate = stated_rate(stated[name], _unit(stated, f"{name}_unit"))
+        known = _items(schema)
+        for name in known.keys() & RATES:
+            self.sample_rate = stated_rate(known[name], unit_of(known, f"{name}_unit"))
         super().__init__(path, list(units), [titled(*named) for named in units.items()], len(units))
 
     def count(self, positions: Sequence[int]) -> int:
