@@ -221,11 +221,12 @@ def _direction(log: Examined) -> Iterator[Finding]:
             "above its resonance.",
         )
     elif log.loop.opening > WIDE and not log.stepped:
-        yield doubt(
+        yield note(
             "wide loop",
             f"The loop of displacement over voltage is {100 * log.loop.opening:.0f} % of the stroke wide, "
-            "that of a stage 10 to 25 %: the displacement is late (a delay, a slow sensor or filter), or a "
-            "servo was on. Record more slowly with the servo off, or shift one of the columns.",
+            "that of most stages 10 to 25 %: there is much backlash, the displacement is late (a delay, a "
+            "slow sensor or filter), or a servo was on. Record more slowly with the servo off, or shift one of "
+            "the columns.",
         )
 
 
