@@ -225,8 +225,8 @@ def _direction(log: Examined) -> Iterator[Finding]:
             "wide loop",
             f"The loop of displacement over voltage is {100 * log.loop.opening:.0f} % of the stroke wide, "
             "that of most stages 10 to 25 %: there is much backlash, the displacement is late (a delay, a "
-            "slow sensor or filter), or a servo was on. Record more slowly with the servo off, or shift one of "
-            "the columns.",
+            "slow sensor or filter), or a servo was on. Record more slowly with the servo off, or shift one "
+            "of the columns.",
         )
 
 
