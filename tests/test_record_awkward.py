@@ -8,7 +8,20 @@ import pytest
 from piezoest.records import read_record, read_reference
 
 ROWS = [(0.001 * k, 50.0 + k % 7, 4.6 + 0.01 * (k % 7)) for k in range(60)]
-TABLE = "\n".join(f"{1e3 * t:.1f} {1e3 * x:.2f} {1e3 * u:.1f}" for t, u, x in ROWS)
+
+
+def table(row: str) -> str:
+    """A line for each of the rows; `row` is a format of their number k, t [s], u [V] and x [µm].
+
+    It may also use ms, mv and nm, the same in smaller units, and day, the time as a spreadsheet counts it.
+    """
+    return "\n".join(
+        row.format(k=k, t=t, u=u, x=x, ms=1e3 * t, mv=1e3 * u, nm=1e3 * x, day=45_000.0 + t / 86_400.0)
+        for k, (t, u, x) in enumerate(ROWS, 1)
+    )
+
+
+TABLE = table("{ms:.1f} {nm:.2f} {mv:.1f}")
 
 
 @pytest.mark.parametrize(
@@ -19,13 +32,12 @@ TABLE = "\n".join(f"{1e3 * t:.1f} {1e3 * x:.2f} {1e3 * u:.1f}" for t, u, x in RO
         ),
         pytest.param(
             "Zeit [s] Spannung [V] Weg [nm] Soll Temp Kraft\n"
-            + "\n".join(f"{t:.4f} {u:.4f} {1e3 * x:.3f} 1,5 21,5 1,25".replace(".", ",") for t, u, x in ROWS),
+            + table("{t:.4f} {u:.4f} {nm:.3f} 1,5 21,5 1,25").replace(".", ","),
             {},
             id="decimal commas between blanks",
         ),
         pytest.param(
-            "Run 12\nTime;Voltage;Position;Force\nms;V;nm;N\n"
-            + "\n".join(f"{1e3 * t:.1f};{u:.1f};{1e3 * x:.2f};1.5" for t, u, x in ROWS),
+            "Run 12\nTime;Voltage;Position;Force\nms;V;nm;N\n" + table("{ms:.1f};{u:.1f};{nm:.2f};1.5"),
             {},
             id="a unit that is not known",
         ),
@@ -45,21 +57,18 @@ TABLE = "\n".join(f"{1e3 * t:.1f} {1e3 * x:.2f} {1e3 * u:.1f}" for t, u, x in RO
         pytest.param(f"# t[ms] x[nm] u[mV] -- by hand\n{TABLE}", {}, id="names among other words"),
         pytest.param("time-ms;position-nm;drive-mV\n" + TABLE, {"voltage": "drive"}, id="parted otherwise"),
         pytest.param(
-            "time (ms)\tPosition (Âµm)\tvoltage (mV)\n"
-            + "\n".join(f"{1e3 * t:.1f}\t{x:.5f}\t{1e3 * u:.1f}" for t, u, x in ROWS),
+            "time (ms)\tPosition (Âµm)\tvoltage (mV)\n" + table("{ms:.1f}\t{x:.5f}\t{mv:.1f}"),
             {},
             id="wrong encoding",
         ),
-        pytest.param("0,1,2\n" + "\n".join(f"{t:.4f},{u:.4f},{x:.5f}" for t, u, x in ROWS), {}, id="counted"),
+        pytest.param("0,1,2\n" + table("{t:.4f},{u:.4f},{x:.5f}"), {}, id="counted"),
         pytest.param(
-            "time,voltage,displacement\n"
-            + "\n".join(f"0 days 00:00:{t:09.6f},{u:.4f},{x:.5f}" for t, u, x in ROWS),
+            "time,voltage,displacement\n" + table("0 days 00:00:{t:09.6f},{u:.4f},{x:.5f}"),
             {},
             id="durations",
         ),
         pytest.param(
-            "time,voltage,displacement\n"
-            + "\n".join(f"2026/1/2 9:05:{t:06.3f} UTC,{u:.4f},{x:.5f}" for t, u, x in ROWS),
+            "time,voltage,displacement\n" + table("2026/1/2 9:05:{t:06.3f} UTC,{u:.4f},{x:.5f}"),
             {},
             id="a zone",
         ),
@@ -69,13 +78,13 @@ TABLE = "\n".join(f"{1e3 * t:.1f} {1e3 * x:.2f} {1e3 * u:.1f}" for t, u, x in RO
             id="line of units",
         ),
         pytest.param(
-            '"t","u","x"\n' + "\n".join(f'"{k}",{t},{u},{x}' for k, (t, u, x) in enumerate(ROWS, 1)),
+            '"t","u","x"\n' + table('"{k}",{t},{u},{x}'),
             {},
             id="numbers of rows from R",
         ),
         pytest.param(
             "Time [ ms ],Error [mm],Output [mV],Position [nanometer]\n"
-            + "\n".join(f"{1e3 * t:.1f},0.5,{1e3 * u:.1f},{1e3 * x:.2f}" for t, u, x in ROWS),
+            + table("{ms:.1f},0.5,{mv:.1f},{nm:.2f}"),
             {"voltage": "Output"},
             id="a name of two quantities",
         ),
@@ -103,7 +112,7 @@ def test_a_row_that_begins_with_an_error_of_a_spreadsheet_is_no_comment(tmp_path
 
 def test_a_rate_beside_other_numbers_is_taken(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
-    rows = "\n".join(f"{u:.1f},{x:.3f}" for _, u, x in ROWS)
+    rows = table("{u:.1f},{x:.3f}")
     path.write_text(
         f"Scope 12\nSample rate: 10 kHz, 2 channels\nvoltage_V,displacement_um\n{rows}", encoding="utf-8"
     )
@@ -116,7 +125,7 @@ def test_a_rate_beside_other_numbers_is_taken(tmp_path: Path) -> None:
 )
 def test_a_rate_that_is_cut_at_its_comma_is_not_taken(tmp_path: Path, stated: str) -> None:
     path = tmp_path / "log.csv"
-    rows = "\n".join(f"{u:.1f},{x:.3f}" for _, u, x in ROWS)
+    rows = table("{u:.1f},{x:.3f}")
     path.write_text(f"Scope 12\n{stated}\nvoltage_V,displacement_um\n{rows}", encoding="utf-8")
     with pytest.raises(ValueError, match="sample rate"):
         read_record(path)
@@ -124,11 +133,11 @@ def test_a_rate_that_is_cut_at_its_comma_is_not_taken(tmp_path: Path, stated: st
 
 def test_more_columns_than_are_wanted_need_numbers(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
-    path.write_text("\n".join(f"{t:.3f},{u:.1f},{x:.3f},{x:.3f}" for t, u, x in ROWS), encoding="utf-8")
+    path.write_text(table("{t:.3f},{u:.1f},{x:.3f},{x:.3f}"), encoding="utf-8")
     with pytest.raises(ValueError, match="name voltage and displacement by their numbers"):
         read_record(path, sample_rate=1000.0)
     read_record(path)
-    path.write_text("\n".join(f"{t:.3f},{u:.1f}" for t, u, _ in ROWS), encoding="utf-8")
+    path.write_text(table("{t:.3f},{u:.1f}"), encoding="utf-8")
     assert read_reference(path, sample_rate=1000.0).values[0] == ROWS[0][1]
 
 
@@ -152,18 +161,14 @@ def test_what_is_not_sure_is_refused(
     tmp_path: Path, header: str, form: str, columns: dict[str, str], message: str
 ) -> None:
     path = tmp_path / "log.csv"
-    rows = [
-        form.format(t=f"{t:.4f}", u=f"{u:.4f}", x=f"{x:.5f}", k=k, day=45_000.0 + t / 86_400.0)
-        for k, (t, u, x) in enumerate(ROWS)
-    ]
-    path.write_text("\n".join([header, *rows]), encoding="utf-8")
+    path.write_text(f"{header}\n{table(form)}", encoding="utf-8")
     with pytest.raises(ValueError, match=message):
         read_record(path, columns=columns)
 
 
 def test_the_first_column_without_a_name_must_rise_as_time_does(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
-    path.write_text("\n".join(f"{u:.4f},{x:.5f},{x:.5f}" for _, u, x in ROWS), encoding="utf-8")
+    path.write_text(table("{u:.4f},{x:.5f},{x:.5f}"), encoding="utf-8")
     with pytest.raises(ValueError, match="does not rise as time does"):
         read_record(path, sample_rate=1000.0)
 
@@ -182,7 +187,7 @@ def test_a_rate_is_written_as_the_rows_are(tmp_path: Path, stated: str, rate: fl
 @pytest.mark.parametrize("stated", ["Sample Interval,0.5,ms", "Sample rate;2;kHz", "fs: 2 kHz"])
 def test_a_rate_with_its_unit_in_a_cell_of_its_own(tmp_path: Path, stated: str) -> None:
     path = tmp_path / "log.csv"
-    rows = "\n".join(f"{u:.1f},{x:.3f}" for _, u, x in ROWS)
+    rows = table("{u:.1f},{x:.3f}")
     path.write_text(f"Scope 12\n{stated}\nvoltage_V,displacement_um\n{rows}", encoding="utf-8")
     assert read_record(path).sample_rate == 2000.0
 

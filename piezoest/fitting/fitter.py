@@ -169,8 +169,7 @@ class Fitter:
             self._begin(by_plays, once=plays)
         self.delay = search.best_delay(self._log, self.start) if isinstance(delay, str) else delay
         if self.delay > 0.0:
-            self._log = replace(self._log, u=late(self._given, self.delay))
-            self._begin(plays)
+            self._move_delay(self.delay, plays)
         self._leave_out(settle)
         if plays and self.delay_estimated:
             self._refine_delay()
@@ -262,9 +261,9 @@ class Fitter:
         """What the richest model misses [µm rms]."""
         return float(np.sqrt(np.mean(_residual(self._log, self._richest)[self._log.counts] ** 2)))
 
-    def _move_delay(self, delay: float) -> None:
+    def _move_delay(self, delay: float, plays: bool = True) -> None:
         self.delay, self._log = delay, replace(self._log, u=late(self._given, delay))
-        self._begin(plays=True)
+        self._begin(plays)
 
     @property
     def _bent_plays(self) -> PlayColumns:

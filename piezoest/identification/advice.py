@@ -35,7 +35,7 @@ def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
         *delay_sentences(found.delay, found.sample_rate, found.delay_known, found.delay_estimated),
         *_creep(found),
         *_centre(data),
-        *_remainder(found, data),
+        *_remainder(found),
         *_along(found),
         *beyond_sentences("The held-out part", found.learnt_on, held_out, found.sample_rate),
     )
@@ -121,9 +121,8 @@ def _creep(found: Identification) -> list[str]:
     if found.creep_known or max(each.creep for each in found.candidates) == 0.0:
         return []
     creep = found.best.creep
-    has = (
-        "has none" if creep == 0.0 else f"creeps by {f'{100.0 * creep:.2g}' if creep < 1.0 else 'over 100'} %"
-    )
+    percent = f"{100.0 * creep:.2g}" if creep < 1.0 else "over 100"
+    has = f"creeps by {percent} %" if creep else "has none"
     return [
         "Creep is not known: all swings of the voltage are alike and no rest follows them, so creep looks "
         f"like a wider loop. The model {has}: where the voltage rests it may be off. Record a rest, too."
@@ -146,16 +145,21 @@ def _centre(data: Data) -> list[str]:
     return said
 
 
-def _remainder(found: Identification, data: Data) -> list[str]:
+def _is_small(found: Identification, error: float) -> bool:
+    """Whether an error [µm] is one that good models leave."""
+    return abs(error) <= SMALL * float(np.ptp(found.learnt_on.displacement))
+
+
+def _remainder(found: Identification) -> list[str]:
     said = []
     floor, error = found.noise_floor, min(found.best.cross_validated, found.held_out.rms)
-    worth_a_word = error > SMALL * float(np.ptp(data.x[data.counts]))
-    if error > ABOVE_NOISE * floor and worth_a_word:
+    small = _is_small(found, error)
+    if error > ABOVE_NOISE * floor and not small:
         said.append(
             f"The error ({error:.2g} µm rms) is larger than the noise ({floor:.2g} µm): no model here "
             "explains the rest."
         )
-    if not found.whiteness.is_white and worth_a_word:
+    if not found.whiteness.is_white and not small:
         said.append(
             "The residual is not white: what is left is not noise but what the model cannot do "
             "(creep, drift, rate, minor loops); the standard errors are widened for it."
@@ -190,13 +194,13 @@ def _oscillation(found: Identification) -> list[str]:
 
 
 def _drift(found: Identification) -> list[str]:
-    least = max(DRIFT_WORTH_A_WORD * found.train.rms, SMALL * float(np.ptp(found.learnt_on.displacement)))
-    if abs(found.fit.drift) > least:
+    least = DRIFT_WORTH_A_WORD * found.train.rms
+    if abs(found.fit.drift) > least and not _is_small(found, found.fit.drift):
         return [
             f"The displacement drifts by about {found.fit.drift:+.2g} µm over the fitted part: fitted beside "
             "the model."
         ]
-    if abs(found.drift) > least:
+    if abs(found.drift) > least and not _is_small(found, found.drift):
         return [f"The displacement drifts by about {found.drift:+.2g} µm over the record against the model."]
     return []
 

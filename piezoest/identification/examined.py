@@ -8,6 +8,7 @@ from piezoest._checks import FloatArray
 from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.fitting.lost_voltage import delay_of
+from piezoest.fitting.surprise import noise_in
 from piezoest.identification.feedback_in_log import goes_in_steps
 from piezoest.identification.loop_direction import Loop, loop_of
 from piezoest.records import Record
@@ -98,8 +99,8 @@ class Examined:
 
     @property
     def noise(self) -> float:
-        """Standard deviation of the displacement's noise, by how it bends from sample to sample [µm]."""
-        return float(np.median(np.abs(np.diff(self.x, 2)))) / 0.6745 / np.sqrt(6.0)
+        """Standard deviation of the displacement's noise [µm]."""
+        return noise_in(np.diff(self.x, 3))
 
     @property
     def unexplained(self) -> float:
