@@ -28,7 +28,7 @@ RATES, WAVES = (1.0, 1e7), (2e-5, 3600.0)
 CALENDARS, TOO_FAST = ((3e4, 8e4), (7e5, 8e5)), 8e4
 # Part of the stroke by which a loop is open the wrong way, in this part of its branches.
 CLOCKWISE, MOST_BRANCHES = 0.015, 0.8
-# ... and by which it is open wider than that of any stage: some have a quarter.
+# ... and by which it is open wider than that of most stages: some have a quarter, with backlash more.
 WIDE = 0.35
 # Deviation from a straight line, relative to the stroke, that no piezo stage keeps to; a doubtful one.
 STRAIGHT, ALMOST_STRAIGHT = 1e-3, 1e-2
