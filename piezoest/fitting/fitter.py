@@ -235,14 +235,16 @@ class Fitter:
         What misses the blocks ahead by more is no better, though it may miss the record by less.
         """
         for _ in range(search.REFINED):
-            before, ahead = self.delay, self._richest.ahead
+            ahead = self._richest.ahead
             step = search.delay_step(self._log, self._given, self._richest, self.delay)
             delay = float(np.clip(self.delay + step, 0.0, search.LONGEST_DELAY))
             if abs(delay - self.delay) < search.CLOSE:
                 break
+            # With all that was fitted with it: returning there costs nothing.
+            before = vars(self).copy()
             self._move_delay(delay)
             if self._richest.ahead > ahead:
-                self._move_delay(before)
+                self.__dict__ = before
                 break
 
     def _try_less_delay(self) -> None:
@@ -250,11 +252,11 @@ class Fitter:
 
         It is another one only if the record is missed by clearly less, and the blocks ahead are as well.
         """
-        before, ahead, missed = self.delay, self._richest.ahead, self._missed
+        ahead, missed, before = self._richest.ahead, self._missed, vars(self).copy()
         self._move_delay(0.0)
         self._refine_delay()
         if self._missed > CLEARLY_LESS * missed or self._richest.ahead > ahead:
-            self._move_delay(before)
+            self.__dict__ = before
 
     @property
     def _missed(self) -> float:
