@@ -27,22 +27,24 @@ class AdaptiveFeedforward(Face):
 
     It measures the gain with small steps of the voltage and moves to the reference. Then it learns the
     hysteresis while it runs, with a straight line, up to four estimators and a Duhem model in parallel, and
-    records the last loop for motion that repeats. What had the smallest recent error computes the voltage (it
-    *drives*). The voltage stays in a corridor around the straight line, and always within the limits.
-    Implausible readings are reported in `status` and `events`; nothing is learnt from them, and the straight
-    line drives.
+    records the last loop for motion that repeats. The model with the smallest recent error computes the
+    voltage: it *drives*. The voltage stays in a corridor around the straight line, and always within the
+    limits. Implausible readings are reported in `status` and `events`; nothing is learnt from them, and the
+    straight line drives.
 
     Parameters
     ----------
     sample_rate : float
         [Hz].
     limits : VoltageLimits
-        Finite voltage range that stage and amplifier tolerate [V]. It protects the stage.
+        Finite voltage range that stage and amplifier tolerate [V]. It protects the stage. At the start, steps
+        of up to a tenth of the range look for the gain.
     estimators : tuple of callable, optional
         Up to four classes of estimators (`HysteresisRLS`, `OutputErrorRLS`, `HysteresisEKF`,
-        `PrandtlIshlinskiiRLS`), or a ``functools.partial`` of one. Default: the first, the second and the
-        last of these; ``()`` is the straight line alone. The controller calls ``factory(sample_rate,
-        initial_model=..., noise=...)``: they work in units of half a swing, in which the gain is about one.
+        `PrandtlIshlinskiiRLS`), or a ``functools.partial`` of one. Default: ``(HysteresisRLS,
+        OutputErrorRLS, PrandtlIshlinskiiRLS)``; ``()`` is the straight line alone. The controller calls
+        ``factory(sample_rate, initial_model=..., noise=...)``: they work in units of half a swing, in which
+        the gain is about one.
     corridor : float
         Largest distance of the voltage from the straight line, as a fraction of half the widest recent
         swing, 0 to 1. Where a stage drifts it is up to three times as much on that side, but not more than
@@ -58,8 +60,9 @@ class AdaptiveFeedforward(Face):
         learnt on by more than 5 %. Give at most one of the three.
     feedback : float, optional
         Integral gain of a feedback from plausible readings [1/s], as in `IntegralFeedback`. Its correction
-        is at most half the corridor's width plus three times the noise. It must be far below twice damping
-        times resonance [rad/s]; where it makes the stage oscillate it is halved. Default: no feedback.
+        is at most the half-width of the corridor plus three times the noise. It must be far below twice
+        damping times resonance [rad/s]; where it makes the stage oscillate it is halved. Default: no
+        feedback.
     resonance : float, optional
         Lowest resonance of the stage [Hz]. An event warns, once, when the reference is above 5 % of it.
         Default: unknown, no warning.

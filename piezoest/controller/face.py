@@ -87,8 +87,9 @@ class Face(Copied):
         """What the controller noticed, oldest first, the last thousand.
 
         ``time`` is that of the sample [s]. ``action`` is ``"fell back"`` (a fault: the line drives and nobody
-        learns), ``"resumed"`` (it is over) or ``"went on"`` (any other event, such as a warning); ``reason``
-        begins with the ``name``, except after ``"resumed"``. Of several in one block the last is kept.
+        learns), ``"resumed"`` (it is over) or ``"went on"`` (any other event, also that no readings come);
+        ``reason`` begins with the ``name``, except after ``"resumed"``. Of several in one block the last is
+        kept.
         """
         return tuple(self._events)
 

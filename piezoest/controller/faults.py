@@ -4,7 +4,7 @@ from typing import Any
 
 from numba.extending import register_jitable
 
-# What each means to the user. The first five are faults, during which nothing is learnt.
+# What each means to the user. The first five and the last are faults, during which nothing is learnt.
 MEANINGS = {
     "no response": "the readings do not answer the voltage",
     "reversed": "the readings go the wrong way",
@@ -12,9 +12,10 @@ MEANINGS = {
     "saturated": "the readings stand still at a level",
     "zero moved": "the readings have moved by a constant",
     "gain": "the stage answers with {gain_before:.3g} µm/V, not {gain:.3g}: the gain is sought",
-    "unknown voltage": "nobody knows what was written, and the line drives until the models have shown again",
-    "shaken": "models made it worse than the line, as where a resonance is shaken: a slower or smoother "
-    "reference helps",
+    "unknown voltage": "nobody knows what was written, and the line drives until the models have proved "
+    "their accuracy again",
+    "shaken": "on three occasions the error with a model was suddenly far larger than with the line, as "
+    "where a resonance is excited: use a slower or smoother reference",
     "resonance": "the reference, at {frequency:.3g} Hz, is above 5 % of the resonance, where the stage's "
     "dynamics count as much as hysteresis: slow it down, smooth it, or put a LeadFilter before it",
     "lag": "the readings are about {lag:.2g} ms late, which at {frequency:.3g} Hz looks like a loop of "
@@ -25,10 +26,10 @@ MEANINGS = {
     "identified from a log that goes as far",
     "out of reach": "the reference asks for {wanted:.4g} µm, and the stage is at {there:.4g} µm with the "
     "voltage at its limit of {limit:.4g} V: keep the reference within what the stage reaches",
-    "false start": "the stage does not go as the start has shown, which was hum or drift: the gain "
-    "is sought again, on longer ways",
+    "false start": "the stage does not answer as at the start, where hum or drift looked like an answer: the "
+    "gain is sought again, with larger steps",
     "feedback": "it goes back and forth, and its gain is halved: the gain is too large, or the readings hum",
-    "no readings": "none has come for {silence:.2g} s: what drives goes on, and nothing is learnt",
+    "no readings": "none has come for {silence:.2g} s: the present model drives on, and nothing is learnt",
 }
 # Their names by their numbers.
 FAULTS = ("", *MEANINGS)
@@ -38,7 +39,7 @@ FAULTS = ("", *MEANINGS)
     NO_READINGS,
 ) = (float(number) for number in range(len(FAULTS)))  # fmt: skip
 # Events that are no faults, but that the user should act on.
-WARNINGS = (FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START, FEEDBACK, NO_READINGS)
+WARNINGS = (SHAKEN, FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START, FEEDBACK, NO_READINGS)
 
 
 @register_jitable

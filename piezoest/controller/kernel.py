@@ -9,7 +9,7 @@ import numpy as np
 
 from piezoest._checks import WILDEST
 from piezoest.compile import Record, Vector, compiled
-from piezoest.controller import candidate, doubt, feedback, homing, late, outside, redraw, slots
+from piezoest.controller import candidate, doubt, feedback, homing, late, outside, redraw, silence, slots
 from piezoest.controller import line as lines
 from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
@@ -134,6 +134,12 @@ def resume(state: Record, settings: Record, u: float, x: float) -> Any:
     starts.rest_at(state.start, settings, u, x, state.start.given * settings.start.gain)
     state.start.told = 1.0
     return True
+
+
+@compiled
+def fault(state: Record, settings: Record) -> Any:
+    """Number of the readings' fault, as in `faults.FAULTS`."""
+    return silence.fault(state, settings)
 
 
 @compiled

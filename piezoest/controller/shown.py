@@ -23,9 +23,9 @@ class Event:
     Parameters
     ----------
     time : float
-        Time since its start [s].
+        Time since the controller was made or reset [s].
     action : str
-        ``"fell back"`` (to a line, for the readings are at fault), ``"resumed"`` or ``"went on"``.
+        ``"fell back"`` (to the line, for the readings are at fault), ``"resumed"`` or ``"went on"``.
     reason : str
         Why, with the figures.
 
@@ -72,10 +72,7 @@ class Candidate:
 
 def fault(state: Any, settings: Any) -> str:
     """Return the name of the readings' fault; empty if there is none."""
-    number = int(state["readings"]["fault"])
-    if number == faults.NONE and silence.is_long(Named(state), Named(settings)):
-        number = int(faults.NO_READINGS)
-    return faults.FAULTS[number]
+    return faults.FAULTS[int(silence.fault(Named(state), Named(settings)))]
 
 
 def event(state: Any, sample_rate: float, learnt_on: Any) -> Event:

@@ -21,6 +21,14 @@ def is_long(state: Any, settings: Any) -> bool:
 
 
 @register_jitable
+def fault(state: Any, settings: Any) -> Any:
+    """Return the number of the readings' fault, one of which is that none comes."""
+    if state.readings.fault == faults.NONE and is_long(state, settings):
+        return faults.NO_READINGS
+    return state.readings.fault
+
+
+@register_jitable
 def watch(state: Any, settings: Any, x: Any) -> None:
     """Count samples without a reading in a row."""
     was_long = is_long(state, settings)

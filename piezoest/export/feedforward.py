@@ -1,19 +1,22 @@
 """An `AdaptiveFeedforward` in C99: its kernel, translated, with the models in use among its state."""
 
 from collections.abc import Iterable
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
 
 from piezoest.controller import kernel, saved
 from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
-from piezoest.controller.faults import FAULTS
+from piezoest.controller.faults import FAULTS, OTHER_GAIN
 from piezoest.controller.shown import STAGES
 from piezoest.export.c_translator import call
 from piezoest.export.c_values import Number, Root, Struct, literal
 from piezoest.export.generated import CCode, estimator_lines, file_of, rendered
 from piezoest.layout import ABSENT, FIXED, Field, Numbers, Record
 
+# Faults of the readings before the first event that is none.
+FIRST_EVENT = int(OTHER_GAIN) - 1
 # Where that is not what was exported.
 _BEGUN = """
 /* Before anything was known. */
@@ -39,11 +42,11 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
     begin = call_of(kernel.begin, "voltage")
     resume = call_of(kernel.resume, "voltage", "displacement")
     turn = f"frequency * {literal(1.0 / controller.sample_rate, file.single)}"
-    home = call_of(kernel.home, "amplitude", turn, "cycles")
+    home, fault = call_of(kernel.home, "amplitude", turn, "cycles"), call_of(kernel.fault)
     begun = ""
     if anew.values.tobytes() != now.values.tobytes():
         begun = _BEGUN.format(name=name, start=file.start(anew.layout, anew.values))
-    limits = controller.limits
+    limits, named = controller.limits, [f"{number} {each}" for number, each in enumerate(FAULTS) if each]
     return rendered(
         file,
         "feedforward",
@@ -59,13 +62,14 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
             "limits": f"{limits.minimum:g} V to {limits.maximum:g} V",
             "stages": _numbered(STAGES),
             "models": _numbered(each.name for each in controller.candidates),
-            "faults": _numbered(each or "none" for each in FAULTS),
+            "faults": ", ".join(("0 none", *named[:FIRST_EVENT], named[-1])),
+            "events": "\n * ".join(wrap(", ".join(named[FIRST_EVENT:-1]), 100)),
         },
         {
             "start": file.start(now.layout, now.values),
             "begun": begun,
             "anew": "begun" if begun else "start",
-            "functions": file.text(f"{step} {learn} {begin} {resume} {home}"),
+            "functions": file.text(f"{step} {learn} {begin} {resume} {home} {fault}"),
             "minimum": literal(limits.minimum, file.single),
             "maximum": literal(limits.maximum, file.single),
             "step": step,
@@ -73,6 +77,7 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
             "begin": begin,
             "resume": resume,
             "home": home,
+            "fault": fault,
         },
         learns=bool(estimators),
     )

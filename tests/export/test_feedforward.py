@@ -82,6 +82,15 @@ def test_voltages_are_the_librarys_over_all_stages_and_faults(name: str) -> None
     assert len(faults) >= 4
 
 
+def test_c_says_that_no_readings_come() -> None:
+    library = controller("line")
+    board = exported(library)
+    for k in range(int(1.5 * FS)):
+        for each in (library, board):
+            each.learn(each.step(0.001 * k), np.nan)
+    assert FAULTS[board.status[2]] == library.status.fault == "no readings"
+
+
 @pytest.mark.slow
 def test_it_goes_on_from_where_it_was_exported() -> None:
     library, own = controller("line", SLEWED), rig("duhem")

@@ -58,5 +58,5 @@ int @name@_get_driving(const @name@_state *state)
 
 int @name@_get_fault(const @name@_state *state)
 {
-    return (int)state->readings.fault;
+    return (int)@fault@;
 }

@@ -42,7 +42,10 @@ int @name@_get_stage(const @name@_state *state);
 /* Model that drives: @models@. */
 int @name@_get_driving(const @name@_state *state);
 
-/* Fault of the readings: @faults@. */
+/* Fault of the readings: @faults@.
+ * Other events are no faults: state->noticed counts all, and state->notice is the number of the last one,
+ * 0 at the end of a fault:
+ * @events@. */
 int @name@_get_fault(const @name@_state *state);
 
 #ifdef __cplusplus
