@@ -116,6 +116,8 @@ def number(cell: str, style: Style) -> float:
         text = text.replace(mark, "")
     if any(mark in text and mark not in style.decimal for mark in ".,"):
         raise ValueError("a mark that is not for decimals")
+    if "_" in text:
+        raise ValueError("digits with a sign between them")
     return float(text.replace(",", "."))
 
 

@@ -48,14 +48,20 @@ SCALES = {unit for units in UNITS.values() for unit in units if len(unit) > 1} |
 }  # fmt: skip
 # Words of other quantities that have the same units.
 OTHERS = {
-    "time": ("exposure", "delay", "period", "lag", "jitter"),
-    "voltage": ("supply", "photodiode", "noise", "rms", "error", "sensor"),
+    "time": ("exposure", "delay", "period", "lag", "jitter", "latency", "cpu", "settle", "settling"),
+    "voltage": (
+        "supply", "photodiode", "pd", "noise", "rms", "error", "sensor", "loadcell", "thermocouple", "strain",
+        "gauge", "cap", "lvdt",
+    ),
     "displacement": (
         "error", "err", "set", "setpoint", "target", "command", "commanded", "cmd", "des", "desired", "sp",
-        "soll", "sollwert", "wavelength", "step", "noise", "rms",
+        "soll", "sollwert", "consigne", "trajectory", "profile", "wavelength", "step", "noise", "rms", "gap",
+        "waist", "roughness",
     ),
     "reference": (),
 }  # fmt: skip
+# What makes two columns of one name.
+MEASURED = ("actual", "act", "measured", "meas", "feedback", "fb")
 # What columns without names are.
 UNNAMED = ("time", "voltage", "displacement")
 # What stands in brackets behind a name; it is the number of an axis or a channel, no unit: 1, AO0, axis 2.
@@ -119,6 +125,9 @@ def choose(
             # Of 1 V and 1 mV one may be meant where the other is written.
             said = f"column {title!r}: 1 in it is taken as {factor[0]:g} {BASE_UNITS[quantity]}"
             factor = factor[0], said
+        if source.titles and quantity not in named and not _is_called(split_unit(title)[0], quantity):
+            said = f"column {title!r}: taken as the {quantity} by its unit"
+            factor = factor[0], factor[1].replace(f"column {title!r}:", f"{said},") or said
         chosen[quantity] = Column(index, title, *factor)
     indices = [column.position for column in chosen.values()]
     for quantity, column in chosen.items():
@@ -165,6 +174,9 @@ def _guess(source: Source, quantity: str) -> int:
         others = [not set(re.split(r"\W+", name.lower())).isdisjoint(OTHERS[quantity]) for name in names]
         alike = [i for i, unit in enumerate(units) if unit in UNITS[quantity] and not others[i]]
         found = [i for i in alike if _quantity(source.titles[i]) == quantity] or called
+    if len(found) == 1 and called and quantity == "displacement":
+        # Beside an actual position, the position may be the one that was commanded.
+        found += [i for i, name in enumerate(names) if _is_measured(name, names[found[0]])]
     if len(found) == 1:
         return found[0]
     if found:
@@ -260,12 +272,24 @@ def _quantity(title: str) -> str | None:
 
 def _is_called(name: str, quantity: str) -> bool:
     """Whether the quantity is called so, or so with what it is of: ``position of axis 1``."""
-    return name.lower().partition(" of ")[0] in NAMES[quantity]
+    plain = name.lower().partition(" of ")[0]
+    # What it counts in may be no unit that is known: then it is asked for.
+    counts = IN_BRACKETS.fullmatch(plain)
+    if counts and (re.search("[%°.]", counts[1]) or not SCALES.isdisjoint(re.findall(r"[^\W\d]+", counts[1]))):
+        plain = re.sub(r"\s*[\[(][^\[(]*$", "", plain)
+    return plain in NAMES[quantity]
+
+
+def _is_measured(name: str, other: str) -> bool:
+    """Whether a name is another one with a word that says it was measured: ``position_actual``."""
+    first, _, last = name.lower().rpartition(" ")
+    return first == other.lower() and last in MEASURED
 
 
 def titled(name: str, unit: str) -> str:
     """Name with the unit that the file states beside it, in place of one that the name states."""
-    plain, own = split_unit(name)
+    # Times of netCDF are in hours, or the like, since a date.
+    unit, (plain, own) = unit.partition(" since ")[0], split_unit(name)
     return f"{plain if own else name} [{unit}]" if unit else name
 
 

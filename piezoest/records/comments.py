@@ -12,24 +12,23 @@ from piezoest.records.columns import (
     with_u,
     with_units,
 )
-from piezoest.records.source import RATES, stated_rate
+from piezoest.records.source import PERIODS, RATES, is_decimated, stated_rate
 
 COMMENTS = ("#", "%")
 # The beginning of a comment, but not of a row whose first cell is an error of a spreadsheet.
 ERRORS = "|".join(re.escape(word) for word in WORDS if word.startswith(COMMENTS))
 COMMENT = rf"(?!(?i:{ERRORS})[^\S\n]*(?:[-+.,;|\d\n]|\Z))[#%]"
 # A line ``sample rate [kHz]: 10`` or ``SAMPLE_TIME = 5e-05``, with the unit beside the name or the number.
-ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.,\deE]+)\s*([^\W\d]\w*)?\s*")
+ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.,\deE]+)\s*([^\W\d][\w/]*)?\s*")
+# Words before a list of units, and before a unit.
+UNIT, BEFORE = ("unit", "units", "einheit", "einheiten", "unité", "unités"), ("in", "is", "are")
 # The unit of a rate or period in a line of its own.
 UNIT_APART = re.compile(r"(?:rate|fs|period|interval|dt|ts|time)[ _]*units?\W+(\w+)", re.I)
-PERIODS = (
-    "dt", "ts", "sample_time", "sampling_time", "sample_period", "sampling_period", "sample_interval", "tinc",
-)  # fmt: skip
 # What the units are in s.
 OF_PERIODS = {"": 1.0, **UNITS["time"]}
 # A line ``NAME0 = Actual Position of Axis 1``, of which Physik Instrumente's GCS arrays have one a column, or
 # ``column 1: time [s]``.
-NUMBERED_NAME = re.compile(r"\s*(?:name|col\.?|column|spalte|channel)\s*(\d+)\s*[=:]\s*(\S.*?)\s*", re.I)
+NUMBERED_NAME = re.compile(r"\s*(?:name|col\.?|column|spalte|channel)?\s*(\d+)\s*[=:)]\s*(\D.*?)\s*", re.I)
 
 
 def is_comment(line: str) -> bool:
@@ -64,6 +63,8 @@ def entries_in(lines: list[list[str]]) -> list[str]:
 
 def rate_in(comments: list[str], style: Style) -> float | None:
     """Sample rate that comments state [Hz], in numbers as rows write them; None for none, or several."""
+    if any(map(is_decimated, comments)):
+        return None
     entries = [entry for comment in comments if (entry := ENTRY.fullmatch(bare(comment)))]
     if any(unit[1].lower() not in ("hz", "s") for unit in map(UNIT_APART.search, comments) if unit):
         entries = [entry for entry in entries if entry[2] or entry[4]]
@@ -73,14 +74,14 @@ def rate_in(comments: list[str], style: Style) -> float | None:
 
 def _rate_of(entry: re.Match[str], style: Style) -> float | None:
     """Sample rate that an entry states [Hz], itself or by its period; None if it is another entry."""
-    name, unit = entry[1].lower().replace(" ", "_"), with_u(entry[2] or entry[4] or "").lower()
+    name, unit = entry[1].lower().replace(" ", "_"), with_u(entry[2] or entry[4] or "")
     value = _value(entry[3], style)
     if entry[2] and entry[4]:
         return None
     if value is not None and name in RATES:
         return stated_rate(value, unit)
-    if value is not None and name in PERIODS and unit in OF_PERIODS:
-        return stated_rate(1.0 / value / OF_PERIODS[unit])
+    if value is not None and name in PERIODS and unit.lower() in OF_PERIODS:
+        return stated_rate(1.0 / value / OF_PERIODS[unit.lower()])
     return None
 
 
@@ -96,26 +97,31 @@ def _value(text: str, style: Style) -> float | None:
 
 def units_in(line: str) -> list[str]:
     """Units that a line states: ``units: s, V, nm``, ``x in nm``, ``position nm``, ``s V nm``."""
-    words = re.findall(r"\d+|[^\W\d_]+", with_u(bare(line)))
-    place = next((k for k, word in enumerate(words) if word.lower() in ("unit", "units", "in")), None)
+    plain = with_u(bare(line))
+    words = re.findall(r"\d+|[^\W\d_]+", plain)
+    pairs = list(itertools.pairwise(words))
+    place = next((k for k, word in enumerate(words) if word.lower() in UNIT), None)
     if place is not None:
-        behind = words[place + 1 :] if words[place].lower() != "in" else words[place + 1 : place + 2]
-        return [word for word in behind if quantity_of_unit(word)]
+        return [word for word in words[place + 1 :] if quantity_of_unit(word)]
+    if behind := [word for before, word in pairs if before.lower() in BEFORE and quantity_of_unit(word)]:
+        return behind
     if len(words) > 1 and all(map(quantity_of_unit, words)):
         return words
-    pairs = itertools.pairwise(words)
+    if alone := [word for word in re.findall(r"[\[(]\s*(\w+)\s*[\])]", plain) if quantity_of_unit(word)]:
+        return alone
     return [unit for name, unit in pairs if quantity_of_unit(unit) in quantities_called(name.lower())]
 
 
 def with_stated_units(names: list[str], lines: list[str]) -> tuple[list[str], dict[str, str]]:
     """Names without units with those of a line that has one for each; else units of lines, and the lines."""
     found: dict[str, str] = {}
-    if any(split_unit(name)[1] for name in names):
+    own = [split_unit(name)[1] for name in names]
+    if own and all(own):
         return names, found
     for line in lines:
         units = units_in(line)
         if len(units) == len(names) and (titles := with_units(names, units)):
-            return titles, {}
+            return [name if unit else title for name, unit, title in zip(names, own, titles, strict=True)], {}
         found |= dict.fromkeys((unit.lower() for unit in units), line)
     return names, found
 

@@ -14,6 +14,9 @@ from piezoest.records.source import LogError, counted
 LARGEST_JITTER = 0.25
 MOST_MISSING, MOST_IN_ALL = 0.1, 0.5
 MENTIONED_JITTER = 0.01
+# Times of too few digits take two steps, a digit apart, and are off by half a digit, or some more; so many
+# long steps are not rows that are missing.
+HALF_STEP, OFTEN = 0.6, 10
 # Part of the rows, and one in any case, that may repeat the time before; with more, digits are too few.
 MOST_REPEATED = 0.01
 
@@ -80,7 +83,7 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
     rows, count, usual, jitter, absent = 0, 0, 0.0, 0.0, 0
     largest, jump, moved, words, uneven = 0, 0, False, "", ""
     repeats, repeated = 0, ""
-    sums, first, last = np.zeros(4), (0, 0.0), (0, 0.0)
+    sums, first, last, least, most = np.zeros(4), (0, 0.0), (0, 0.0), np.inf, 0.0
     for rows, known, old in _known(blocks()):  # noqa: B007
         steps, apart = np.diff(known.times), np.diff(known.rows)
 
@@ -109,6 +112,7 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
             continue
         # Of the first steps only: the median of a whole column would need all of it.
         usual = usual or float(np.median(steps / apart))
+        least, most = min(least, float(np.min(steps))), max(most, float(np.max(steps)))
         whole = np.rint(steps / usual)
         off = np.where(whole < 1.0, 1.0, np.abs(steps / usual - whole))
         gaps = whole - apart
@@ -131,12 +135,14 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
         )
     if count < 2:
         raise LogError(f"{where}: only {counted(count, 'row')} with a time")
-    if uneven:
+    if uneven or absent >= OFTEN:
         # Steps may be so where times are not: of 3, 4 and 3 ms, where three decimals are too few for 10/3.
-        absent, moved, jitter = 0, False, _deviation(sums / count, first, blocks())
-        if jitter > LARGEST_JITTER:
+        off, even = _deviation(sums / count, first, (least, most), blocks())
+        if uneven and not even:
             raise LogError(uneven)
-    elif largest > MOST_MISSING * (rows + absent) or absent > MOST_IN_ALL * (rows + absent):
+        if even:
+            absent, moved, jitter, largest = 0, False, off, 0.0
+    if largest > MOST_MISSING * (rows + absent) or absent > MOST_IN_ALL * (rows + absent):
         raise LogError(f"{words}, {absent} samples are missing in all: cut the log there")
     period = float((last[1] - first[1]) / (last[0] + absent - first[0]))
     notes = []
@@ -154,16 +160,24 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
 
 
 def _deviation(
-    means: FloatArray, first: tuple[int, float], blocks: Iterable[tuple[Any, FloatArray]]
-) -> float:
-    """How far times are off a straight line, in samples, by its sums."""
+    means: FloatArray,
+    first: tuple[int, float],
+    steps: tuple[float, float],
+    blocks: Iterable[tuple[Any, FloatArray]],
+) -> tuple[float, bool]:
+    """How far times are off a straight line, in samples, by its sums; whether rows are even.
+
+    `steps`: the shortest and the longest.
+    """
     k, t, kk, kt = means
     period = (kt - k * t) / (kk - k * k)
-    off = 0.0
+    off, middle, reach = 0.0, 0.5 * (steps[0] + steps[1]), 0.45 * (steps[1] - steps[0])
+    coarse = True
     for _, known, _ in _known(blocks):
         line = first[1] + t + period * (known.rows - first[0] - k)
         off = max(off, float(np.max(np.abs(known.times - line), initial=0.0)) / period)
-    return off
+        coarse = coarse and not np.any(np.abs(np.diff(known.times) - middle) < reach)
+    return off, off <= LARGEST_JITTER or (coarse and off * period <= HALF_STEP * (steps[1] - steps[0]))
 
 
 def placed(timing: Timing, blocks: Iterable[list[FloatArray]]) -> Iterator[list[FloatArray]]:
