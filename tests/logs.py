@@ -93,3 +93,17 @@ def write_lvm(
             content += "\t".join(cells) + ("\tbegins" if k == 0 else "") + "\n"
     path.write_text(content.replace(".", decimal).replace("\t", separator), encoding="utf-8")
     return path
+
+
+ROWS = [(0.001 * k, 50.0 + k % 7, 4.6 + 0.01 * (k % 7)) for k in range(60)]
+
+
+def table(row: str) -> str:
+    """A line for each of the rows; `row` is a format of their number k, t [s], u [V] and x [µm].
+
+    It may also use ms, mv and nm, the same in smaller units, and day, the time as a spreadsheet counts it.
+    """
+    return "\n".join(
+        row.format(k=k, t=t, u=u, x=x, ms=1e3 * t, mv=1e3 * u, nm=1e3 * x, day=45_000.0 + t / 86_400.0)
+        for k, (t, u, x) in enumerate(ROWS, 1)
+    )

@@ -6,20 +6,7 @@ import numpy as np
 import pytest
 
 from piezoest.records import read_record, read_reference
-
-ROWS = [(0.001 * k, 50.0 + k % 7, 4.6 + 0.01 * (k % 7)) for k in range(60)]
-
-
-def table(row: str) -> str:
-    """A line for each of the rows; `row` is a format of their number k, t [s], u [V] and x [µm].
-
-    It may also use ms, mv and nm, the same in smaller units, and day, the time as a spreadsheet counts it.
-    """
-    return "\n".join(
-        row.format(k=k, t=t, u=u, x=x, ms=1e3 * t, mv=1e3 * u, nm=1e3 * x, day=45_000.0 + t / 86_400.0)
-        for k, (t, u, x) in enumerate(ROWS, 1)
-    )
-
+from tests.logs import ROWS, table
 
 TABLE = table("{ms:.1f} {nm:.2f} {mv:.1f}")
 
@@ -153,8 +140,8 @@ def test_more_columns_than_are_wanted_need_numbers(tmp_path: Path) -> None:
         ("t [s],u [V],Error [nm]", "{t},{u},{x}", {}, "no column for displacement"),
         ("# t, position, amplifier", "{t},{x},{u}", {}, "no column for voltage"),
         (",0,1,2", "0,{t},{u},{x}", {}, "no column for time"),
-        ("t,u,x", "{k}000000,{u},{x}", {}, "say the unit, such as units={'time': 'ns'}"),
-        ("t,u,x", "{day:.12f},{u},{x}", {}, "say the unit, such as units={'time': 'days'}"),
+        ("t,u,x", "{k}000000,{u},{x}", {}, "such as 'ns' or '100 ns': units={'time': 'ns'}"),
+        ("t,u,x", "{day:.12f},{u},{x}", {}, "such as 'days' or '100 ns': units={'time': 'days'}"),
     ],
 )
 def test_what_is_not_sure_is_refused(

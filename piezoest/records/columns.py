@@ -56,12 +56,13 @@ OTHERS = {
     "displacement": (
         "error", "err", "set", "setpoint", "target", "command", "commanded", "cmd", "des", "desired", "sp",
         "soll", "sollwert", "consigne", "trajectory", "profile", "wavelength", "step", "noise", "rms", "gap",
-        "waist", "roughness",
+        "waist", "roughness", "range", "stroke",
     ),
     "reference": (),
 }  # fmt: skip
 # What makes two columns of one name.
 MEASURED = ("actual", "act", "measured", "meas", "feedback", "fb")
+PID = ("input", "output")
 # What columns without names are.
 UNNAMED = ("time", "voltage", "displacement")
 # What stands in brackets behind a name; it is the number of an axis or a channel, no unit: 1, AO0, axis 2.
@@ -125,7 +126,7 @@ def choose(
             # Of 1 V and 1 mV one may be meant where the other is written.
             said = f"column {title!r}: 1 in it is taken as {factor[0]:g} {BASE_UNITS[quantity]}"
             factor = factor[0], said
-        if source.titles and quantity not in named and not _is_called(split_unit(title)[0], quantity):
+        if source.titles and quantity not in named and not _names(title, quantity):
             said = f"column {title!r}: taken as the {quantity} by its unit"
             factor = factor[0], factor[1].replace(f"column {title!r}:", f"{said},") or said
         chosen[quantity] = Column(index, title, *factor)
@@ -174,6 +175,10 @@ def _guess(source: Source, quantity: str) -> int:
         others = [not set(re.split(r"\W+", name.lower())).isdisjoint(OTHERS[quantity]) for name in names]
         alike = [i for i, unit in enumerate(units) if unit in UNITS[quantity] and not others[i]]
         found = [i for i in alike if _quantity(source.titles[i]) == quantity] or called
+    lower = [name.lower() for name in names]
+    if len(found) == 1 and lower[found[0]] in PID and {*PID, "setpoint"}.issubset(lower):
+        # To a PID controller its input is what the sensor says, to a model of the stage it is the voltage.
+        found = [lower.index(name) for name in PID]
     if len(found) == 1 and called and quantity == "displacement":
         # Beside an actual position, the position may be the one that was commanded.
         found += [i for i, name in enumerate(names) if _is_measured(name, names[found[0]])]
@@ -275,7 +280,8 @@ def _is_called(name: str, quantity: str) -> bool:
     plain = name.lower().partition(" of ")[0]
     # What it counts in may be no unit that is known: then it is asked for.
     counts = IN_BRACKETS.fullmatch(plain)
-    if counts and (re.search("[%°.]", counts[1]) or not SCALES.isdisjoint(re.findall(r"[^\W\d]+", counts[1]))):
+    words = set(re.findall(r"[^\W\d]+|[%°.]", counts[1])) if counts else set[str]()
+    if not words.isdisjoint(SCALES | set("%°.")):
         plain = re.sub(r"\s*[\[(][^\[(]*$", "", plain)
     return plain in NAMES[quantity]
 
@@ -284,6 +290,12 @@ def _is_measured(name: str, other: str) -> bool:
     """Whether a name is another one with a word that says it was measured: ``position_actual``."""
     first, _, last = name.lower().rpartition(" ")
     return first == other.lower() and last in MEASURED
+
+
+def _names(title: str, quantity: str) -> bool:
+    """Whether a word of a title is a name of the quantity."""
+    words = re.findall(r"[^\W_]+", split_unit(title)[0].lower())
+    return any(word in NAMES[quantity] for word in words) or _is_called(" ".join(words), quantity)
 
 
 def titled(name: str, unit: str) -> str:

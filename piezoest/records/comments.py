@@ -5,27 +5,26 @@ import re
 
 from piezoest.records.cells import ONE_GROUP, WORDS, Style, number
 from piezoest.records.columns import (
-    UNITS,
     quantities_called,
     quantity_of_unit,
     split_unit,
     with_u,
     with_units,
 )
-from piezoest.records.source import PERIODS, RATES, is_decimated, stated_rate
+from piezoest.records.rates import is_decimated, rate_of, stated_rate
 
 COMMENTS = ("#", "%")
 # The beginning of a comment, but not of a row whose first cell is an error of a spreadsheet.
 ERRORS = "|".join(re.escape(word) for word in WORDS if word.startswith(COMMENTS))
 COMMENT = rf"(?!(?i:{ERRORS})[^\S\n]*(?:[-+.,;|\d\n]|\Z))[#%]"
 # A line ``sample rate [kHz]: 10`` or ``SAMPLE_TIME = 5e-05``, with the unit beside the name or the number.
-ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.,\deE]+)\s*([^\W\d][\w/]*)?\s*")
+ENTRY = re.compile(
+    r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.,\deE]+)\s*([^\W\d][\w/]*)?\s*"
+)
 # Words before a list of units, and before a unit.
 UNIT, BEFORE = ("unit", "units", "einheit", "einheiten", "unité", "unités"), ("in", "is", "are")
 # The unit of a rate or period in a line of its own.
 UNIT_APART = re.compile(r"(?:rate|fs|period|interval|dt|ts|time)[ _]*units?\W+(\w+)", re.I)
-# What the units are in s.
-OF_PERIODS = {"": 1.0, **UNITS["time"]}
 # A line ``NAME0 = Actual Position of Axis 1``, of which Physik Instrumente's GCS arrays have one a column, or
 # ``column 1: time [s]``.
 NUMBERED_NAME = re.compile(r"\s*(?:name|col\.?|column|spalte|channel)?\s*(\d+)\s*[=:)]\s*(\D.*?)\s*", re.I)
@@ -74,15 +73,10 @@ def rate_in(comments: list[str], style: Style) -> float | None:
 
 def _rate_of(entry: re.Match[str], style: Style) -> float | None:
     """Sample rate that an entry states [Hz], itself or by its period; None if it is another entry."""
-    name, unit = entry[1].lower().replace(" ", "_"), with_u(entry[2] or entry[4] or "")
     value = _value(entry[3], style)
-    if entry[2] and entry[4]:
+    if value is None or (entry[2] and entry[4]):
         return None
-    if value is not None and name in RATES:
-        return stated_rate(value, unit)
-    if value is not None and name in PERIODS and unit.lower() in OF_PERIODS:
-        return stated_rate(1.0 / value / OF_PERIODS[unit.lower()])
-    return None
+    return rate_of(entry[1], value, entry[2] or entry[4] or "")
 
 
 def _value(text: str, style: Style) -> float | None:
@@ -110,6 +104,11 @@ def units_in(line: str) -> list[str]:
     if alone := [word for word in re.findall(r"[\[(]\s*(\w+)\s*[\])]", plain) if quantity_of_unit(word)]:
         return alone
     return [unit for name, unit in pairs if quantity_of_unit(unit) in quantities_called(name.lower())]
+
+
+def states_units(line: str) -> bool:
+    """Whether a comment states units, also behind names as in ``t_s,x_um``."""
+    return bool(units_in(line)) or any(split_unit(word)[1] for word in re.split(r"[\s,;]+", bare(line)))
 
 
 def with_stated_units(names: list[str], lines: list[str]) -> tuple[list[str], dict[str, str]]:

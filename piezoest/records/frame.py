@@ -11,11 +11,14 @@ import numpy as np
 
 from piezoest import _extras
 from piezoest._checks import FloatArray
-from piezoest.records.cells import is_missing
+from piezoest.records.beside import units_beside
+from piezoest.records.cells import Style, is_missing
 from piezoest.records.columns import NAMES, split_unit, titled, with_units
+from piezoest.records.comments import entries_in, rate_in, with_stated_units
 from piezoest.records.source import EXTRA, LogError, Rows, Source, check_size, damaged, floats, shown
 
 TIMES = datetime.date | datetime.time | datetime.timedelta
+NO_FLOATS = [datetime.datetime, datetime.date, datetime.time, datetime.timedelta]
 NO_NUMBERS = bool | np.bool_ | complex | np.complexfloating
 
 
@@ -46,14 +49,20 @@ class Frame(Source):
         bad = (
             np.zeros(1) if cells.dtype.kind in "mMfiu" else (cells.notna() & ~_are_numbers(cells)).to_numpy()
         )
+        if not bad.any() and cells.dtype.kind == "O" and cells.map(type).isin(NO_FLOATS).any():
+            raise LogError(
+                f"{self.path}: {self._title(position)} has several kinds of times: make it seconds"
+            )
         if not bad.any():
             return floats(cells)
         k = int(np.argmax(bad))
-        title = self.names[position] if self.names else str(position + 1)
         raise LogError(
-            f"{self.path}, row {self._first + k}, column {shown(title)!r}: {shown(str(cells.iloc[k]))!r} is "
+            f"{self.path}, row {self._first + k}, {self._title(position)}: {shown(str(cells.iloc[k]))!r} is "
             "not a number: make it one"
         )
+
+    def _title(self, position: int) -> str:
+        return f"column {shown(self.names[position] if self.names else str(position + 1))!r}"
 
 
 def _are_numbers(cells: Any) -> Any:
@@ -83,7 +92,7 @@ def frame_source(frame: Any) -> Frame:
         series = [pd.Series(each.to_numpy()) for each in frame.get_columns()]
     # The columns of an array that became a frame are only numbered.
     nameless = list(frame.columns) == list(range(len(series)))
-    titles = list(names)
+    series, titles = list(map(_typed, series)), list(names)
     index = getattr(frame, "index", pd.RangeIndex(0))
     if index.dtype.kind in "mM" or (index.dtype.kind in "fiu" and _is_time(str(index.name))):
         names = [str(index.name) if index.name is not None else "index", *names]
@@ -94,7 +103,10 @@ def frame_source(frame: Any) -> Frame:
         raise LogError("frame has no rows" if series else "frame has no columns")
     if nameless:
         names = titles = []
-    return Frame(Path("frame"), series, names, titles, 1, "it is in memory already")
+    found = Frame(Path("frame"), series, names, titles, 1, "it is in memory already")
+    attributes = getattr(frame, "attrs", {})
+    found.stated_units = units_beside((str(key), str(text)) for key, text in attributes.items())
+    return found
 
 
 def _is_time(name: str) -> bool:
@@ -117,7 +129,8 @@ def open_sheet(path: Path) -> Frame:
         sheets = pd.read_excel(
             path, sheet_name=None, header=None, dtype=object, engine="calamine", na_filter=False
         )
-    for sheet in sheets.values():
+    for title in sheets:
+        sheet = sheets[title]
         sheet = sheet.mask(sheet.map(lambda cell: is_missing(str(cell))))
         numbers, cells = (_are_numbers(sheet) & sheet.notna()).sum(axis=1), sheet.notna().sum(axis=1)
         numeric = np.flatnonzero(numbers > 1)
@@ -137,22 +150,33 @@ def open_sheet(path: Path) -> Frame:
     lines = [[str(name).strip() for name in line] for line in above.fillna("").to_numpy()]
     names = lines[-1] if lines else []
     if len(lines) > 1:
-        names = with_units(lines[-2], names) or names
+        names = with_units(lines[-2], names) or with_units(names, lines[-2]) or names
     # A title above the table is no header.
     header = names if sum(map(bool, names)) > 1 else []
+    # Other lines above may be longer than the table.
+    said = [list(map(str, line)) for line in sheet.iloc[:begins].fillna("").to_numpy()]
+    header, units = with_stated_units(header, list(map(" ".join, said)))
     series = [_typed(table[i]) for i in table.columns]
-    return Frame(
+    found = Frame(
         path, series, header, header, begins + 1, "a spreadsheet is read as a whole: save the log as CSV"
     )
+    found.stated_units, found.sample_rate = units, rate_in(entries_in(said), Style())
+    if len(sheets) > 1:
+        found.note(f"sheet {shown(title)!r} of {len(sheets)} is read")
+    return found
 
 
 def _typed(cells: Any) -> Any:
     """Column with dates and times of day as pandas has them."""
     import pandas as pd
 
+    if cells.dtype.kind != "O":
+        return cells
     known = cells.dropna()
     if known.map(lambda cell: isinstance(cell, datetime.time)).all():
         return pd.Timestamp(0) + pd.to_timedelta(cells.astype(str), errors="coerce")
+    if known.map(lambda cell: isinstance(cell, datetime.timedelta)).all():
+        return pd.to_timedelta(cells)
     if known.map(lambda cell: isinstance(cell, datetime.date)).all():
-        return pd.to_datetime(cells)
+        return pd.to_datetime(cells, utc=True)
     return cells.infer_objects()

@@ -134,8 +134,18 @@ def chunks(path: Path, encoding: str, rows: int) -> Iterator[tuple[int, str, int
                 raise LogError(f"{path}, line {number}: more than {LONGEST_LINE} characters: this is no log")
 
 
-def sample_lines(path: Path, encoding: str, begins: int, skip_blank: bool, rows: int) -> Iterator[Lines]:
-    """Lines with samples, from the line `begins` on; a blank one is a sample if another follows it."""
+def sample_lines(
+    path: Path,
+    encoding: str,
+    begins: int,
+    skip_blank: bool,
+    rows: int,
+    left_out: Callable[[int, str], object] = lambda number, line: None,
+) -> Iterator[Lines]:
+    """Lines with samples, from the line `begins` on; a blank one is a sample if another follows it.
+
+    `left_out` is told number and text of each comment between them.
+    """
     blank: list[tuple[int, str]] = []
     for first, text, done in chunks(path, encoding, rows):
         if first >= begins and not blank and not SPECIAL.search("\n" + text):
@@ -143,7 +153,10 @@ def sample_lines(path: Path, encoding: str, begins: int, skip_blank: bool, rows:
             continue
         kept: list[tuple[int, str]] = []
         for number, line in enumerate(text.split("\n"), first):
-            if number < begins or is_comment(line):
+            if number < begins:
+                continue
+            if is_comment(line):
+                left_out(number, line)
                 continue
             if line.strip():
                 kept += [*blank, (number, line)]

@@ -13,8 +13,8 @@ SHEET_ENDINGS = (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods")
 ARCHIVE = b"PK\x03\x04"
 # Name, what files begin with, endings of their names, and what opens them.
 FORMATS: tuple[tuple[str, tuple[bytes, ...], tuple[str, ...], str], ...] = (
-    ("Parquet", (b"PAR1",), (".parquet", ".pq"), "formats:Parquet"),
-    ("HDF5", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), (".h5", ".hdf5", ".hdf", ".he5"), "formats:open_hdf5"),
+    ("Parquet", (b"PAR1",), (".parquet", ".pq"), "parquet:Parquet"),
+    ("HDF5", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), (".h5", ".hdf5", ".hdf", ".he5"), "hdf5:open_hdf5"),
     ("MATLAB", (b"MATLAB 5.0",), (), "formats:open_mat"),
     ("NumPy", (b"\x93NUMPY",), (".npy",), "formats:open_npy"),
     ("TDMS", (b"TDSm",), (".tdms",), "formats:Tdms"),

@@ -2,7 +2,6 @@
 
 import abc
 import contextlib
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -19,21 +18,6 @@ ROWS = 1 << 17
 # better is no log, and would fill the memory.
 PLENTY, MOST_PACKED = 1 << 28, 200
 LONGEST_SHOWN = 60
-# Names under which a file may state its sample rate [Hz], or the time between samples [s], in lower case.
-RATES = (
-    "fs", "f_s", "sample_rate", "samplerate", "sampling_rate", "sample_rate_hz", "sampling_rate_hz",
-    "sampling_frequency", "sample_frequency", "abtastrate", "abtastfrequenz",
-)  # fmt: skip
-PERIODS = (
-    "dt", "ts", "sample_time", "sampling_time", "sample_period", "sampling_period", "sample_interval",
-    "sampling_interval", "tinc", "abtastzeit",
-)  # fmt: skip
-OF_RATES = {
-    "": 1.0, "hz": 1.0, "khz": 1e3, "k": 1e3, "mhz": 1e6, "s/s": 1.0, "sa/s": 1.0, "sps": 1.0, "ks/s": 1e3,
-    "ksa/s": 1e3, "ksps": 1e3,
-}  # fmt: skip
-# A file that keeps one sample of several states a rate that may be that of all of them.
-DECIMATED = re.compile(r"(?:decimat|downsampl|untersetz|record_table_rate)\D*(\d+)", re.I)
 
 
 class LogError(ValueError):
@@ -118,23 +102,6 @@ def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
 def counted(number: int, noun: str = "time") -> str:
     """How many, in words: ``once`` and ``3 times``, or ``1 sample`` and ``3 samples``."""
     return "once" if number == 1 and noun == "time" else f"{number} {noun}{'s' * (number != 1)}"
-
-
-def stated_rate(value: Any, unit: str = "") -> float | None:
-    """Sample rate that a file states [Hz]; None if it is not one number above zero, or of unknown unit."""
-    try:
-        # Of all units only this one is another in capitals.
-        factor = 1e-3 if unit.strip() == "mHz" else OF_RATES[unit.strip().lower()]
-        number = factor * float(np.asarray(value).reshape(()))
-    except (TypeError, ValueError, OverflowError, KeyError):
-        return None
-    return number if 0.0 < number < np.inf else None
-
-
-def is_decimated(text: str) -> bool:
-    """Whether a text says that only one sample of several was kept."""
-    found = DECIMATED.search(text)
-    return found is not None and int(found[1]) > 1
 
 
 def finite(values: Any) -> FloatArray:

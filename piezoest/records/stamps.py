@@ -11,14 +11,14 @@ HALF = r"(\s*[AaPp]\.?[Mm]\.?)"
 # 2026-11-22T10:00:00.005+01:00, as ISO 8601 has it.
 ISO = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(:\d{2})?([.,]\d+)?\s*(Z|z|[-+]\d{2}(:?\d{2})?)?")
 # 22.11.2026 10:00:00,005 and 11/22/26 10:00:00.005 AM, and a date of ISO 8601 before AM or PM.
-DATE = r"(\d{1,2})([./])(\d{1,2})\2(\d{4}|\d{2})[,.]?\s+"
+DATE = r"(\d{1,2})([./]|-(?=\d{1,2}-\d{4}))(\d{1,2})\2(\d{4}|\d{2})[,.]?\s+"
 ISO_DATE = r"(\d{4}[-/]\d{2}[-/]\d{2})\s+"
 TIME = rf"(\d{{1,2}})(:\d{{2}}(?::\d{{2}}(?:[.,]\d+)?)?){HALF}?"
 DATED, PARTS = (re.compile(rf"(?:{DATE}|{ISO_DATE}){often}{TIME}") for often in ("", "?"))
 OF_DAY = re.compile(rf"\d{{1,2}}:\d{{2}}:\d{{2}}([.,]\d+)?{HALF}?")
 OF_HOUR = re.compile(r"\d{1,2}:\d{2}[.,]\d+")  # minutes and seconds: with two parts, only a fraction tells
 TURNS = {OF_DAY: 86_400.0, OF_HOUR: 3600.0}
-SLASHES = re.compile(r"(\d{1,2})/(\d{1,2})/\d{2}")
+SLASHES = re.compile(r"(\d{1,2})([/-])(\d{1,2})\2\d{2}")
 # 22-Nov-2026 10:00:00:005
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 NAME = rf"({'|'.join(MONTHS)})[a-z]*"
@@ -27,11 +27,15 @@ NAMED = re.compile(rf"(\d{{1,2}})[-. ]\s*{NAME}[-. ]\s*(?=\d)", re.IGNORECASE)
 NAME_FIRST = re.compile(rf"{NAME}\.? +(\d{{1,2}})[,.]? +(?=\d{{4}}\b)", re.IGNORECASE)
 YEAR_LAST = re.compile(rf"[a-z]{{3}} +{NAME} +(\d{{1,2}}) +(\d\d:\d\d:\d\d\S*) +(\d{{4}})", re.IGNORECASE)
 # 20261122T100000, 2026/1/2 and the 0 days 10:00:00 of pandas
-WITHOUT_MARKS = re.compile(r"(\d{4})(\d\d)(\d\d)[T -](\d\d):?(\d\d):?(\d\d)(?!\d)")
+WITHOUT_MARKS = re.compile(
+    r"(?<![\d.])((?:19|20)\d\d)(0[1-9]|1[0-2])([0-2]\d|3[01])[T _-]?"
+    r"([01]\d|2[0-3]):?([0-5]\d):?([0-5]\d)(?!\d)"
+)
 SHORT_DATE = re.compile(r"(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})(?=[T ])")
 DAYS = re.compile(r"([0-9]|[12]\d) days? \+?(?=\d)")
 # What stands behind a time says nothing more: a time without zone is taken as UTC.
-ZONE = re.compile(r"\s*(?:UTC|GMT)$")
+ZONE = re.compile(r"\s*(?:UTC|GMT|CES?T|[EMP][SD]T|MES?Z|Uhr|\[[\w/]+\])$")
+DAY_OF_WEEK = re.compile(r"(?:mon|tue|wed|thu|fri|sat|sun)[a-z]*, +", re.IGNORECASE)
 MILLISECONDS = re.compile(r"(:\d{2}:\d{2}):(?=\d{3}(?!\d))")
 DAY = "2000-01-01T"
 # A clock that begins anew stands so near its beginning, in parts of a turn; elsewhere it was set.
@@ -40,7 +44,8 @@ NEAR = 1.0 / 24.0
 
 def _plain(cell: str) -> str:
     """Cell with numbers for names of months, the usual marks, and a point before milliseconds."""
-    cell = ZONE.sub("", cell.strip())
+    cell = re.sub(r"^(\S{8,10})_(?=\d\d:)", r"\1 ", DAY_OF_WEEK.sub("", cell.strip(" ['\t")))
+    cell = ZONE.sub("", cell).rstrip(" ]")
     cell = WITHOUT_MARKS.sub(r"\1-\2-\3 \4:\5:\6", YEAR_LAST.sub(r"\2-\1-\4 \3", cell))
     cell = SHORT_DATE.sub(lambda date: f"{date[1]}-{date[2]:0>2}-{date[3]:0>2}", cell)
     cell = DAYS.sub(lambda days: f"2000-01-{int(days[1]) + 1:0>2} ", cell)
@@ -108,9 +113,12 @@ class Clock(NamedTuple):
         plain = _plain(cell)
         turns = (turn for pattern, turn in TURNS.items() if pattern.fullmatch(plain))
         slashes = SLASHES.match(cell.strip())
-        first, second = map(int, slashes.groups()) if slashes else (0, 13)
-        guessed = cell.strip() if max(first, second) <= 12 and first != second else ""
-        return cls(times_of([cell], first > 12)[0], next(turns, np.inf), first > 12, guessed)
+        first, second = (int(slashes[1]), int(slashes[3])) if slashes else (0, 13)
+        dashes = slashes is not None and slashes[2] == "-"
+        guessed = cell.strip() if max(first, second) <= 12 and first != second and not dashes else ""
+        # With dashes the day usually stands first.
+        day_first = first > 12 or (dashes and second <= 12)
+        return cls(times_of([cell], day_first)[0], next(turns, np.inf), day_first, guessed)
 
 
 class Onward:

@@ -7,20 +7,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import WILDEST, FloatArray, instance, integer, positive
-from piezoest.records.columns import BASE_UNITS, UNITS, Column, choose, has_column, split_unit
+from piezoest.records.columns import BASE_UNITS, Column, choose
+from piezoest.records.first_rows import (
+    FIRST_ROWS,
+    check_first_column,
+    contradicted,
+    ignored,
+    in_seconds,
+    states_its_rate,
+)
 from piezoest.records.opening import open_source
-from piezoest.records.source import ROWS, LogError, Rows, Source, counted
+from piezoest.records.source import ROWS, Rows, Source, counted
 from piezoest.records.timing import Timing, placed, scan
 
 FEWEST_ROWS = 10
-# Rows by which a sample rate that is given is compared with the column of time, and how near it must be.
-FIRST_ROWS, SAME_RATE = 1000, 0.01
-# Time since 1970 is between these [s] from 2000 to 2100: so its size tells its unit, one of these.
-SINCE_1970 = 9.4e8, 4.1e9
-# A column without a unit is not in seconds if these are farther apart than some minutes, or if they count
-# days, as spreadsheets do from 1900 on: then a sample seems to take less than a microsecond.
-LONGEST_PERIOD, SHORTEST_OF_DAYS, DAYS = 600.0, 2e-6, 1e4
-OF_STAMPS = ("ms", "us", "ns")
 
 # Called with how much is done, and of how much.
 Progress = Callable[[int, int], object]
@@ -89,20 +89,20 @@ class RecordStream:
         self._rows = integer("rows", rows, 1)
         self._source = source = path if isinstance(path, Source) else open_source(Path(path))
         notes = []
-        if sample_rate is None and "time" not in named and _states_its_rate(source):
+        if sample_rate is None and "time" not in named and states_its_rate(source):
             sample_rate = source.sample_rate
             notes.append(f"sample rate of {sample_rate:g} Hz as the file states it")
         timed = ("time",) if sample_rate is None else ()
         self._chosen = choose(source, (*timed, *wanted), named, units)
-        if sample_rate is not None and not source.titles and not named:
-            _check_first_column(source, len(wanted))
+        if not source.titles and not named:
+            check_first_column(source, len(self._chosen), bool(timed))
         if sample_rate is not None and not notes:
-            notes += _contradicted(source, named, units, sample_rate)
+            notes += contradicted(source, named, units, sample_rate)
         self._positions = [column.position for column in self._chosen.values()]
         source.check(self._positions)
         self._held = list(source.read(self._positions, ROWS)) if held else None
         if timed and (first := next(self._read("time", rows=FIRST_ROWS), None)):
-            self._chosen["time"] = _in_seconds(source, self._chosen["time"], units, first.values[0])
+            self._chosen["time"] = in_seconds(source, self._chosen["time"], units, first.values[0])
         self._timing: Timing | None = None
         if sample_rate is None:
             self._timing = scan(str(source.path), source.place, lambda: self._times(progress))
@@ -110,7 +110,7 @@ class RecordStream:
         self.sample_rate = positive("sample_rate", sample_rate)
         timing = self._timing.notes if self._timing else ()
         if self._timing is not None and source.sample_rate is not None:
-            timing = (*timing, *_ignored(source.sample_rate, self._timing.sample_rate))
+            timing = (*timing, *ignored(source.sample_rate, self._timing.sample_rate))
         self._said = (*notes, *_notes(source, self._chosen), *timing)
 
     def __repr__(self) -> str:
@@ -283,78 +283,10 @@ def sane(values: FloatArray) -> FloatArray:
     return np.where(np.abs(values) < WILDEST, values, np.nan)
 
 
-def _states_its_rate(source: Source) -> bool:
-    if source.sample_rate is None:
-        return False
-    return not has_column(source, "time") if source.titles else source.width == 2
-
-
 def _mapping(name: str, given: Any) -> dict[str, Any]:
     return dict(
         instance(name, {} if given is None else given, Mapping, f"a mapping: {name}={{'voltage': ...}}")
     )
-
-
-def _in_seconds(source: Source, column: Column, units: Mapping[str, str], times: FloatArray) -> Column:
-    """The column of time by its first numbers; without a unit, stamps since 1970 have that of their size."""
-    known = times[np.isfinite(times)]
-    if "time" in units or (source.titles and split_unit(column.title)[1]) or not known.size:
-        return column
-    first, period = float(known[0]), float(np.median(np.diff(known))) if known.size > 1 else 1.0
-    for unit in OF_STAMPS:
-        factor = UNITS["time"][unit]
-        if SINCE_1970[0] <= factor * first < SINCE_1970[1]:
-            said = f"column {column.title!r}: taken as {unit.replace('us', 'µs')} since 1970"
-            column = column._replace(factor=factor, note=said)
-            break
-    seconds = column.factor * period
-    of_days = 0.0 < seconds < SHORTEST_OF_DAYS and abs(first) > DAYS
-    if seconds > LONGEST_PERIOD or of_days:
-        unit = "days" if of_days else "ns"
-        raise LogError(
-            f"{source.path}: column {column.title!r} has no unit; its rows would be {seconds:.3g} s apart: "
-            f"say the unit, such as units={{'time': '{unit}'}}, or --units time={unit}"
-        )
-    return column
-
-
-def _check_first_column(source: Source, wanted: int) -> None:
-    """Refuse columns without names of which the first, beside those that are wanted, is not time."""
-    if source.width == wanted:
-        return
-    first = next((rows.values[0] for rows in source.read([0], FIRST_ROWS)), np.empty(0))
-    if np.any(np.diff(first[np.isfinite(first)]) < 0.0):
-        raise LogError(
-            f"{source.path}: {source.width} columns without a header, and the first does not rise as time "
-            "does: name voltage and displacement by their numbers, such as columns={'voltage': '1', "
-            "'displacement': '2'}, or --columns voltage=1,displacement=2"
-        )
-
-
-def _contradicted(
-    source: Source, named: dict[str, str], units: Mapping[str, str], sample_rate: float
-) -> list[str]:
-    """What to say where a column of time, by its first rows, has another sample rate than is given."""
-    if "time" not in named and not (source.titles and has_column(source, "time")):
-        return []
-    try:
-        column = choose(source, ("time",), named, units)["time"]
-        times = next(source.read([column.position], FIRST_ROWS)).values[0][:FIRST_ROWS]
-        column = _in_seconds(source, column, units, times)
-    except (LogError, StopIteration):
-        return []
-    steps = column.factor * np.diff(times[np.isfinite(times)])
-    rate = 1.0 / float(np.median(steps)) if steps.size and np.median(steps) > 0.0 else sample_rate
-    if abs(rate / sample_rate - 1.0) < SAME_RATE:
-        return []
-    return [f"column {column.title!r} has {rate:.4g} Hz, it is ignored: {sample_rate:g} Hz was given"]
-
-
-def _ignored(stated: float, found: float) -> list[str]:
-    """What to say where a file states another sample rate than its column of time has."""
-    if abs(found / stated - 1.0) < SAME_RATE:
-        return []
-    return [f"the file states {stated:g} Hz, which is ignored: time has {found:.4g} Hz"]
 
 
 def _notes(source: Source, chosen: dict[str, Column]) -> list[str]:

@@ -135,13 +135,14 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
         )
     if count < 2:
         raise LogError(f"{where}: only {counted(count, 'row')} with a time")
-    if uneven or absent >= OFTEN:
+    # Steps that differ by more than one are no matter of digits.
+    if uneven or (absent >= OFTEN and most - least < 1.5 * usual):
         # Steps may be so where times are not: of 3, 4 and 3 ms, where three decimals are too few for 10/3.
-        off, even = _deviation(sums / count, first, (least, most), blocks())
+        apart_from_line, even = _deviation(sums / count, first, (least, most), blocks())
         if uneven and not even:
             raise LogError(uneven)
         if even:
-            absent, moved, jitter, largest = 0, False, off, 0.0
+            absent, largest, moved, jitter = 0, 0, False, apart_from_line
     if largest > MOST_MISSING * (rows + absent) or absent > MOST_IN_ALL * (rows + absent):
         raise LogError(f"{words}, {absent} samples are missing in all: cut the log there")
     period = float((last[1] - first[1]) / (last[0] + absent - first[0]))
