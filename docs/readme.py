@@ -22,25 +22,24 @@ FIGURE = DOCS / "figures" / "effect.png"
 BEGIN, END = "<!-- figures: made by docs/readme.py -->\n", "<!-- end of figures -->\n"
 ROW = "5.0 µm @ 5.0 Hz"  # of the paper's tables
 TEXT = """
-The first table names the best estimator over {stages} simulated stages. Its errors are those on the simulated
-stage of the paper, in % of the amplitude. The first three rows give the geometric mean of the largest errors
-of all periods after the change. *A small first error* and *Long rests* give the largest error of the first
-period, the other rows the settled error. The simulated stage of the paper is a sum of plays (elements with
-backlash), as is the model of PrandtlIshlinskiiRLS. So in some rows the error of this estimator is smaller
-than the one in the table. Real stages are not sums of plays.
+The first table names the best estimator over {stages} simulated stages. Its errors are means over all of them,
+in % of the amplitude. The first three rows give the geometric mean of the largest errors of all periods after
+the change. *A small first error* and *Rests* give the largest error of the first period, the other rows the
+settled error.
 
-The second table is for the same stage; its errors are in % of the amplitude, too. *Settles*: periods
-after a change until every further error is below {level:g} %, and the share of runs that settle; *others
-settle*: this share on the other stages, in the scenarios that repeat. *First*: largest error in the first
-period after the change. This is a mean over the kinds of change: after a cold start it is {cold} % for
-AdaptiveFeedforward. *Settled*: largest error in the last half of the periods. *Step*: one sample, called
-from Python; for AdaptiveFeedforward one `step` and one `learn`. Each number is the median over {seeds}
-seeds ({slow} for the slow estimators), then the geometric mean over the scenarios. Measured on {machine}
-on {date}{since}. A dash: {dash}
+The second table is for the simulated stage of the paper, except *others settle*. *Settles*: periods after a
+change until every further error is below {level:g} % of the amplitude (median of all runs), and the share of
+runs that settle; *others settle*: this share on the other stages, in the scenarios that repeat. *First*:
+largest error in the first period after the change. This is a mean over the kinds of change: after a cold
+start it is {cold} % for AdaptiveFeedforward. *Settled*: largest error in the last half of the periods. Both
+are the median over {seeds} seeds ({slow} for the slow estimators), then the geometric mean over the
+scenarios. *Step*: mean time of one sample, called from Python; for AdaptiveFeedforward one `step` and one
+`learn`. The stage of the paper is a sum of plays (elements with backlash), as is the model of
+PrandtlIshlinskiiRLS; real stages are not. Measured on {machine} on {date}{since}. A dash: {dash}
 
 With a resonance, late readings or backlash the error on your rig is larger, and it takes longer to settle. On
 {rigs} simulated rigs drawn at random, half of them with a fault, the voltage never left its limits. On
-{share:.0f} % of them the error was at some time clearly larger than that of a straight line, and on
+{share:.1f} % of them the error was at some time clearly larger than that of a straight line, and on
 {end:.1f} % at the end. See *Safety on unknown rigs* in the documentation.
 
 The paper measured a largest error of {linear_theirs:g} µm with linear feed-forward and {theirs:g} µm with

@@ -1,6 +1,6 @@
 """Follow a reference on a real stage, and leave the stage at rest whatever happens.
 
-Replace the class Driver by the calls of your converters, and set the constants. As it stands, the program
+Replace the methods of the class Driver, and set the constants. As it stands, the program
 runs on a simulated stage:
 
     python examples/own_stage.py
@@ -28,7 +28,7 @@ FILE = Path("run.npz")
 
 
 class Driver:
-    """Writes volts at the stage, reads micrometres; replace the three methods."""
+    """Opens the hardware, writes volts at the stage, reads micrometres; replace the four methods."""
 
     def __init__(self) -> None:
         self._stage = pz.PaperStage(RATE, seed=0)
@@ -138,6 +138,10 @@ def main(driver: Any) -> int:
     print(f"{run.done} of {len(reference)} samples, {run.late} late; record in {FILE}")
     if run.done:
         print(f"time per sample: median {np.median(busy):.0f} µs, longest {busy.max():.0f} µs")
+        off = np.abs(run.record["reference"] - run.record["displacement"])[: run.done]
+        period = int(reference.period)
+        first, last = (np.nanmax(part, initial=0.0) for part in (off[:period], off[-period:]))
+        print(f"largest error: first period {first:.3f} µm, last period {last:.3f} µm")
     print(controller.status, *controller.events, sep="\n")
     return 0 if failure is None else 1
 

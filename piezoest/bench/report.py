@@ -104,14 +104,13 @@ def needs_table(document: Document) -> Table:
         # Who did not run everywhere is not named as being as good everywhere.
         alike = [names[row["estimator"]] for row in others if row["p"] >= SURE and row["everywhere"]]
         worse = [row for row in others if row["p"] < SURE and row["ratio"][0] >= 1.0]
-        value = best["value"] or best["others"]
         body.append(
             [
                 need["words"],
                 " or ".join([names[best["estimator"]], *alike]),
-                percent(value[0]),
+                percent(best["value"][0]),
                 names[worse[0]["estimator"]] if worse else "—",
-                number(worse[0]["ratio"][0], 2) if worse else "—",
+                number(worse[0]["ratio"][0] / best["ratio"][0], 2) if worse else "—",
             ]
         )
     return heading, body

@@ -38,14 +38,14 @@ class Need:
 CHANGES = ("amplitude-switch", "amplitude-drop", "gain-step")
 NEEDS = (
     Need("Unknown use: mean over all scenarios", "typical"),
-    Need("A start from wrong parameters", "typical", ("cold-start",)),
+    Need("A start without correct parameters", "typical", ("cold-start",)),
     Need("Fast recovery after a change of amplitude or gain", "typical", CHANGES),
     Need("A small first error at such a change", "first", CHANGES),
     Need("The least error once settled, one amplitude", "settled", ("cold-start",)),
     Need("Minor loops and signals that do not repeat", "settled", ("prbs", "random-walk", "two-tone")),
-    Need("A gain that drifts", "settled", ("drift",)),
-    Need("Long rests", "first", ("dwell",)),
-    Need("A noisy sensor", "settled", ("noise",)),
+    Need("A gain that falls by 1 % a second", "settled", ("drift",)),
+    Need("Rests of 5 s", "first", ("dwell",)),
+    Need("A sensor with 0.1 to 30 nm of noise", "settled", ("noise",)),
 )
 
 
@@ -90,8 +90,8 @@ def order(frame: pd.DataFrame, need: Need, stages: Sequence[str]) -> list[dict[s
     """Estimators in order of a need, the best first, each compared with the best by the runs they share.
 
     `frame`: runs, from `relative`. `stages`: of the campaign; who ran on the first one only is never the
-    best. Returns ``value`` with its interval on the first stage and ``others`` on the rest; ``ratio`` to the
-    best with its interval, and ``p``, allowed for the number of comparisons (Holm).
+    best. Returns ``value``, over the stages on which an estimator ran, and ``ratio`` to the best, both with
+    their intervals, and ``p``, allowed for the number of comparisons (Holm).
     """
     there = frame[frame["scenario"].isin(need.scenarios)] if need.scenarios else frame
     runs = {str(name): group for name, group in there.groupby("estimator", sort=False) if name != LINEAR}
@@ -100,15 +100,12 @@ def order(frame: pd.DataFrame, need: Need, stages: Sequence[str]) -> list[dict[s
     best = next((name for name in ranked if name in everywhere), ranked[0])
     found: list[dict[str, Any]] = []
     for name in ranked:
-        first = runs[name][runs[name]["stage"] == stages[0]]
-        others = runs[name][runs[name]["stage"].isin(stages[1:])]
         d = _by_seed(runs[name], runs[best], need.quantity)
         found.append(
             {
                 "estimator": name,
                 "everywhere": name in everywhere,
-                "value": interval(first, need.quantity) if len(first) else None,
-                "others": interval(others, need.quantity) if len(others) else None,
+                "value": interval(runs[name], need.quantity),
                 "ratio": _interval(d[np.newaxis]),
                 "p": 1.0 if name == best else signed_rank(d),
             }

@@ -221,7 +221,7 @@ class BatchFit(Hopping):
         Returns
         -------
         BatchFitResult
-            If the solver failed: the best it came by, and its own words.
+            If the solver failed: the best that it found, and its own words.
 
         Raises
         ------

@@ -16,7 +16,8 @@ class BatchFitResult(Outcome):
         Names of the entries of `theta`: alpha, beta, gamma (or gain), offset, initial_state,
         creep_gains[0], …
     theta : ndarray, shape (n,)
-        All parameters, held ones too.
+        All parameters, held ones too: alpha [1/V], beta [µm/V], gamma [µm/V²], offset and state [µm], gains
+        of creep [1], as far as they are fitted.
     P : ndarray, shape (n, n)
         Covariance of `theta` from the information matrix; zero for parameters that were held or
         ended at a bound, very large if the record does not tell the parameters apart.
@@ -36,7 +37,7 @@ class BatchFitResult(Outcome):
     creep : Creep or None
         Creep with the fitted gains.
     success : bool
-        Whether the solver converged. If not, the parameters are the best it came by.
+        Whether the solver converged. If not, the parameters are the best that it found.
     message : str
         The solver's own words.
     evaluations : int

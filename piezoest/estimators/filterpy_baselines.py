@@ -189,7 +189,7 @@ class FilterPyEKF(_FilterPyBaseline):
     Notes
     -----
     Equal to ``HysteresisEKF(..., project=False)`` at the cost of filterpy. The filterpy
-    object is at hand as `filter`. Source: R. Labbe, filterpy.
+    object is the attribute `filter`. Source: R. Labbe, filterpy.
 
     Examples
     --------
@@ -234,7 +234,7 @@ class FilterPyUKF(_FilterPyBaseline):
     Notes
     -----
     Merwe's scaled sigma points with alpha = 0.1, beta = 2, kappa = 3 - n. The filterpy object
-    is at hand as `filter`. Source: R. Labbe, filterpy; R. van der Merwe, thesis (2004).
+    is the attribute `filter`. Source: R. Labbe, filterpy; R. van der Merwe, thesis (2004).
 
     Examples
     --------

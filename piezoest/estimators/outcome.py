@@ -11,7 +11,7 @@ from piezoest.models import Model
 
 @runtime_checkable
 class Estimator(Protocol):
-    """What `piezoest.track` needs of an estimator: any class with these two members.
+    """What `piezoest.track` needs of an estimator: a method ``step(u, x)`` and an attribute ``model``.
 
     An estimator may also have ``run(u, x)``, which `track` then prefers to a loop of ``step``.
     """

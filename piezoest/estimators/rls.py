@@ -65,9 +65,10 @@ class HysteresisRLS(Freezable):
         Compute the covariance of the estimate's error, for `standard_errors`, and the mean square of the
         regressor, for `excitation`. This costs about as much as the law itself: :doc:`/performance`.
     policies : tuple of policies, optional
-        Policies in addition to `memory`. Default with ``memory="period"``: ``(RandomWalk(), DeadZone(),
-        OutlierRejection())``, or ``(PeriodicForgetting(), DeadZone())`` for a `LinearGain`. Else
-        ``(NormBound(), DeadZone(), Normalisation())``, which is the paper's law with a dead zone.
+        They replace the defaults: to add one, write all. Default with ``memory="period"``: ``(RandomWalk(),
+        DeadZone(), OutlierRejection())``, of which the first is the memory itself, or
+        ``(PeriodicForgetting(), DeadZone())`` for a `LinearGain`. Else ``(NormBound(), DeadZone(),
+        Normalisation())``, which is the paper's law with a dead zone; a number for `memory` always forgets.
 
     Raises
     ------

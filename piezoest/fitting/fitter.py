@@ -51,11 +51,11 @@ def fit(
     """Fit one kind of model to a record, by the error of the simulated displacement.
 
     All in which a model is linear (slopes of plays, their bends, gain, offset, drift, jumps) is one convex
-    program, solved by CasADi and checked by SciPy. The record is cut into five blocks; smoothness of
-    neighbouring slopes is that with which each but the first is predicted best from the others. Creep gains,
-    alpha, the delay and the stage's state before the record are found outside it. Spikes, dropouts and
-    clipped readings are left out, and so is a start that has not settled; jumps of the displacement are
-    fitted beside the model.
+    program, solved by CasADi and checked by SciPy. The record is cut into five blocks. How smooth
+    neighbouring slopes must be is chosen by how well each block but the first is predicted from the others.
+    Creep gains, alpha, the delay and the stage's state before the record are found outside it. Spikes,
+    dropouts and clipped readings are left out, and so is a start that has not settled; jumps of the
+    displacement are fitted beside the model.
 
     Parameters
     ----------

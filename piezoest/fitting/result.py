@@ -47,7 +47,8 @@ class Fit:
     initial_state : float or ndarray
         Initial state for `model.simulate` on this record: of plays in V, of a loop and of creep in µm.
     held_out : float
-        Prediction error of each of five blocks except the first, from a fit to the others [µm rms].
+        Prediction error of each of five blocks except the first, from a fit to the others [µm rms]. It is not
+        the held-out error of `identify`.
     ahead : float
         Prediction error of the last two blocks, from a fit to those before them [µm rms]; under voltages and
         loops that those have seen, if they are a fifth of the blocks.
