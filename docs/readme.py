@@ -22,10 +22,10 @@ FIGURE = DOCS / "figures" / "effect.png"
 BEGIN, END = "<!-- figures: made by docs/readme.py -->\n", "<!-- end of figures -->\n"
 ROW = "5.0 µm @ 5.0 Hz"  # of the paper's tables
 TEXT = """
-The first table names the best estimator over {stages} simulated stages. Its errors are means over all of them,
-in % of the amplitude. The first three rows give the geometric mean of the largest errors of all periods after
-the change. *A small first error* and *Rests* give the largest error of the first period, the other rows the
-settled error.
+The first table names the best estimator over {stages} simulated stages. Its errors are means over all of
+them, in % of the amplitude. The first three rows give the geometric mean of the largest errors of all periods
+after the change. *A small first error* and *Rests* give the largest error of the first period, the other rows
+the settled error.
 
 The second table is for the simulated stage of the paper, except *others settle*. *Settles*: periods after a
 change until every further error is below {level:g} % of the amplitude (median of all runs), and the share of

@@ -29,9 +29,8 @@ class Table(Source):
 
     `opened`: returns a context manager of what `arrays` takes. `arrays`: yields name, array and unit: a
     vector is one column, a matrix several, a number called fs the sample rate. `texts`: names and texts that
-    stand beside the arrays. `separator`: what stands
-    between a name and the folder or structure that it is in; empty if there are none. `whole`: as for
-    `Source`.
+    stand beside the arrays. `separator`: what stands between a name and the folder or structure that it is
+    in; empty if there are none. `whole`: as for `Source`.
     """
 
     def __init__(
@@ -46,17 +45,13 @@ class Table(Source):
         whole: str = "",
     ) -> None:
         self._format, self._opened, self._arrays = format_, opened, arrays
-        rates: set[float | None] = set()
 
         def leaf(name: str) -> str:
             return name.rsplit(separator, 1)[-1] if separator else name
 
         with damaged(path, format_), opened() as file:
             found = list(arrays(file))
-            for name, values, unit in found:
-                if np.prod(shape_of(values)) == 1:
-                    value = np.asarray(values[0:1] if shape_of(values) else values[()])
-                    rates |= {rate_of(leaf(name), value, unit), *_kept_of(leaf(name), value)}
+            self.sample_rate, self.no_rate = _rate_in((leaf(name), *rest) for name, *rest in found)
             self.stated_units = units_beside(texts(file))
             columns = list(columns_of(found))
             names = [name for name, _, _ in columns]
@@ -67,11 +62,6 @@ class Table(Source):
                 "timeseries cannot be read: save their columns as arrays"
             )
         check_size(path, 8 * max(self._lengths))
-        rates -= {None}
-        if len(rates) == 1:
-            self.sample_rate = rates.pop()
-        elif rates:
-            self.no_rate = "it states several sample rates, or that only some samples were kept"
         leaves = [leaf(name) for name in names]
         titles = [titled(title, unit) for title, (_, _, unit) in zip(leaves, columns, strict=True)]
         # One matrix and nothing else: its columns have no names.
@@ -118,9 +108,17 @@ class _Part(NamedTuple):
         return self.matrix[part, self.place] if self.axis == 0 else self.matrix[self.place, part]
 
 
-def _kept_of(name: str, value: Any) -> tuple[float, ...]:
-    """A rate that is none, beside any other, if a number says that only one sample of several was kept."""
-    return (np.inf,) if is_decimated(f"{name} {value.ravel()[0]}") else ()
+def _rate_in(found: Iterable[Any]) -> tuple[float | None, str]:
+    """Sample rate that numbers state [Hz]; or None, and why it is not known although they state one."""
+    numbers = [
+        (name, np.asarray(values[0:1] if shape_of(values) else values[()]).reshape(()), unit)
+        for name, values, unit in found
+        if np.prod(shape_of(values)) == 1
+    ]
+    rates = {rate_of(*number) for number in numbers} - {None}
+    if len(rates) > 1 or (rates and any(is_decimated(f"{name} {value}") for name, value, _ in numbers)):
+        return None, "it states several sample rates, or that only some samples were kept"
+    return (rates.pop() if rates else None), ""
 
 
 def shape_of(values: Any) -> tuple[int, ...]:
