@@ -118,27 +118,35 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
     like_first = len(head[begins]) == len(first) and _delimiter(filled[begins][1]) == mark
     like_first &= begins < 2 or names_columns(first) or not names_columns(head[begins - 1])
     if begins < 2 or like_first or len(head) < min(len(filled), LONGEST_PREAMBLE):
-        header, begins = ([], 0) if _is_row_of_numbers(first) else (first, 1)
-        if (counted := counted_names(first, head[1:2])) is not None:
-            header, begins = counted, 1
-        if header and len(head) > 1:
-            # Numbers with decimal commas may be parted by blanks, and rows otherwise than names.
-            mark = mark if len(header) != len(head[1]) else _delimiter(filled[1][1])
-            second = split(path, [filled[1][1]], mark)[0] if mark == " " else head[1]
-            if len(header) != len(second):
-                header = _titles(path, filled[0][1], mark, len(second))
-        if header and [row[0] for row in head[1:3]] == ["1", "2"] and len(head[1]) == len(first) + 1:
-            # R writes no name above its column of numbers.
-            header = ["", *first]
-        if header and len(head) > 2 and (named := with_units(header, head[1])):
-            header, begins = named, 2
-        return mark, header, filled[begins:]
+        return _headed_by_first(path, filled, head)
     upper, lower = head[begins - 2 : begins]
     header = with_units(upper, lower) or with_units(lower, upper) or lower
     if len(header) != len(head[begins]):
         # Nothing says what is what: columns go by their numbers.
         header = [str(k + 1) for k in range(len(head[begins]))]
     return _delimiter(filled[begins][1]), header, filled[begins:]
+
+
+def _headed_by_first(
+    path: Path, filled: list[Numbered], head: list[list[str]]
+) -> tuple[str, list[str], list[Numbered]]:
+    """Delimiter, header and rows where nothing stands above the header, or rows begin at once."""
+    first, mark = head[0], _delimiter(filled[0][1])
+    header, begins = ([], 0) if _is_row_of_numbers(first) else (first, 1)
+    if (counted := counted_names(first, head[1:2])) is not None:
+        header, begins = counted, 1
+    if header and len(head) > 1:
+        # Numbers with decimal commas may be parted by blanks, and rows otherwise than names.
+        mark = mark if len(header) != len(head[1]) else _delimiter(filled[1][1])
+        second = split(path, [filled[1][1]], mark)[0] if mark == " " else head[1]
+        if len(header) != len(second):
+            header = _titles(path, filled[0][1], mark, len(second))
+    if header and [row[0] for row in head[1:3]] == ["1", "2"] and len(head[1]) == len(first) + 1:
+        # R writes no name above its column of numbers.
+        header = ["", *first]
+    if header and len(head) > 2 and (named := with_units(header, head[1])):
+        header, begins = named, 2
+    return mark, header, filled[begins:]
 
 
 def _named_in_comments(path: Path, comments: list[str], row: str, delimiter: str) -> list[str]:
