@@ -5,18 +5,17 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from piezoest.tracking import TrackingRecord
 
 # One timed pass takes about so long: where a whole record takes longer, its beginning is timed.
-PASS_SECONDS, PASSES, LEAST_SAMPLES = 0.4, 3, 200
+PASS_SECONDS, PASSES, LEAST_SAMPLES = 0.4, 9, 200
 
 
 def step_seconds(new: Callable[[], Any], record: TrackingRecord) -> float:
-    """Time of one sample by `step` from Python [s], of new estimators or controllers; median of three passes.
+    """Mean time of one sample by `step` from Python [s], of new estimators or controllers.
 
-    A controller answers to the reference, and learns from what was recorded.
+    It is that of the fastest pass: the others were disturbed by other programs. A controller answers to the
+    reference, and learns from what was recorded.
     """
     columns = (record.reference, record.voltage, record.measured)
     rows = list(zip(*(values.tolist() for values in columns), strict=True))
@@ -24,7 +23,7 @@ def step_seconds(new: Callable[[], Any], record: TrackingRecord) -> float:
     _pass(new(), trial)  # loads what is compiled
     seconds = _pass(new(), trial)
     rows = rows[: max(len(trial), math.ceil(len(trial) * PASS_SECONDS / max(seconds, 1e-9)))]
-    return float(np.median([_pass(new(), rows) for _ in range(PASSES)])) / len(rows)
+    return min(_pass(new(), rows) for _ in range(PASSES)) / len(rows)
 
 
 def _pass(made: Any, rows: list[tuple[float, float, float]]) -> float:
