@@ -13,11 +13,10 @@ NAMES = ("columns", "column_names", "colheaders", "names", "channels", "labels",
 UNITS = ("unit", "units", "column_units")
 # Longer lists are no names of columns.
 MOST_WORDS = 1000
-# Names of texts that may state a unit, and words in them that do: no part of µm/V.
-OF_UNITS, WORD = (
-    re.compile("unit|label|long_?name|description|dimension", re.I),
-    re.compile(r"(?<![/^\w])[^\W\d_]+(?![/^\w])"),
-)
+# Names of texts that may state a unit.
+OF_UNITS = re.compile("unit|label|long_?name|description|dimension", re.I)
+# Words of such a text, but for those of µm/V.
+WORD = re.compile(r"(?<![/^\w])[^\W\d_]+(?![/^\w])")
 
 
 def words_of(value: Any) -> list[str]:

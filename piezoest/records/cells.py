@@ -117,7 +117,7 @@ def number(cell: str, style: Style) -> float:
     if any(mark in text and mark not in style.decimal for mark in ".,"):
         raise ValueError("a mark that is not for decimals")
     if "_" in text:
-        raise ValueError("digits with a sign between them")
+        raise ValueError("an underscore in a number")
     return float(text.replace(",", "."))
 
 

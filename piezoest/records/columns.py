@@ -60,8 +60,9 @@ OTHERS = {
     ),
     "reference": (),
 }  # fmt: skip
-# What makes two columns of one name.
+# A name with such a word behind it is what a sensor measured; the name alone may be what was commanded.
 MEASURED = ("actual", "act", "measured", "meas", "feedback", "fb")
+# Columns of a PID controller, beside its setpoint.
 PID = ("input", "output")
 # What columns without names are.
 UNNAMED = ("time", "voltage", "displacement")

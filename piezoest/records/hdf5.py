@@ -8,7 +8,7 @@ import numpy as np
 from piezoest import _extras
 from piezoest.records.beside import MOST_WORDS, NAMES, UNITS, stated, texts_of, unit_of, words_of
 from piezoest.records.rates import DECIMATED, PERIODS, RATES
-from piezoest.records.source import EXTRA, LogError, check_size, finite, shown
+from piezoest.records.source import EXTRA, LogError, check_size, damaged, finite, shown
 from piezoest.records.table import Named, Table, columns_of
 
 PACKING = (("scale_factor", 1.0), ("add_offset", 0.0))
@@ -22,27 +22,27 @@ TEXT = (b"char", "char")  # MATLAB's class of text, which is an array of numbers
 def open_hdf5(path: Path) -> Table:
     """Open an HDF5 file: each array a column, or several, by its path; fields of compound types too."""
     h5py = _extras.load("h5py", EXTRA, "reading HDF5 and MATLAB 7.3")
+    # They are looked for once: the arrays are listed again for each reading.
+    with damaged(path, "HDF5"), h5py.File(path, "r") as file:
+        words = _words(h5py, file)
     return Table(
         path,
         "HDF5",
         lambda: h5py.File(path, "r"),
-        lambda file: _in_hdf5(h5py, path, file),
-        texts=lambda file: [
-            *((name, ", ".join(words)) for name, words in _texts(h5py, file).items()),
-            *_attributes(file),
-        ],
+        lambda file: _in_hdf5(h5py, path, file, words),
+        texts=lambda file: [*((name, ", ".join(each)) for name, each in words.items()), *_attributes(file)],
         separator="/",
     )
 
 
-def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
+def _in_hdf5(h5py: Any, path: Path, file: Any, words: dict[str, list[str]]) -> list[Named]:
+    """Columns and rates. `words`: what `_words` finds."""
     found = _rates("", file.attrs)
     # A link is followed by nobody here, but a column that is not found for it would be a riddle.
     if outside := file.visititems_links(
         lambda name, link: name if isinstance(link, h5py.ExternalLink) else None
     ):
         raise LogError(f"{path}: {shown(outside)} lies in another file: {ONE_FILE}")
-    texts = _texts(h5py, file)
 
     def visit(name: str, item: Any) -> None:
         # MATLAB keeps what cells and objects refer to in these.
@@ -58,14 +58,14 @@ def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
         if others:
             raise LogError(f"{path}: {shown(name)} lies in another file, {shown(others[0])}: {ONE_FILE}")
         check_size(path, int(item.nbytes))
-        units = stated(item.attrs, *UNITS) or texts.get(f"{name}_unit") or texts.get(f"{name}_units") or []
+        units = stated(item.attrs, *UNITS) or words.get(f"{name}_unit") or words.get(f"{name}_units") or []
         if item.dtype.names:
             known = dict(zip(item.dtype.names, units, strict=False))
             fields = [field for field in item.dtype.names if item.dtype[field].kind in "fiu"]
             found.extend((f"{name}/{field}", item.fields(field), known.get(field, "")) for field in fields)
         elif item.dtype.kind in "fiu" and item.attrs.get("MATLAB_class") not in TEXT:
             above = name.rpartition("/")[0]
-            beside = [texts.get(f"{above}/{key}".lstrip("/"), []) for key in NAMES]
+            beside = [words.get(f"{above}/{key}".lstrip("/"), []) for key in NAMES]
             attributes = [stated(each.attrs, *NAMES) for each in (item, item.parent)]
             names = next(filter(None, (*attributes, *beside)), [])
             found.extend(_columns_of(name, _unpacked(item), names, _counts(item) or units))
@@ -89,7 +89,7 @@ def _rates(above: str, attributes: Any) -> list[Named]:
         (
             above + name,
             np.asarray(value),
-            unit_of(attributes, *(f"{name}_{end}".lower() for end in UNITS[:2])),
+            unit_of(attributes, *(f"{name}_{end}".lower() for end in ("unit", "units"))),
         )
         for name, value in found
         if np.size(value) == 1
@@ -103,23 +103,23 @@ def _attributes(file: Any) -> list[tuple[str, str]]:
     return found
 
 
-def _texts(h5py: Any, file: Any) -> dict[str, list[str]]:
+def _words(h5py: Any, file: Any) -> dict[str, list[str]]:
     """Words in arrays of text, in MATLAB's text and in its cells of text, by the path of the array."""
     found: dict[str, list[str]] = {}
 
-    def words(item: Any) -> list[str]:
+    def words_in(item: Any) -> list[str]:
         if getattr(item, "shape", None) is None or item.size > MOST_WORDS:
             return []
         if item.attrs.get("MATLAB_class") in TEXT:
             return ["".join(chr(int(sign)) for sign in np.ravel(item[()]))]
         if h5py.check_ref_dtype(item.dtype):
-            return [word for each in np.ravel(item[()]) if each for word in words(file[each])]
+            return [word for each in np.ravel(item[()]) if each for word in words_in(file[each])]
         if h5py.check_string_dtype(item.dtype):
             return words_of(np.asarray(item.asstr()[()], dtype=str))
         return []
 
     def visit(name: str, item: Any) -> None:
-        if not _is_hidden(name) and (known := words(item)):
+        if not _is_hidden(name) and (known := words_in(item)):
             found[name] = known
 
     file.visititems(visit)

@@ -9,7 +9,7 @@ import numpy as np
 from piezoest import _extras
 from piezoest.records.beside import UNITS, texts_of, unit_of, units_beside
 from piezoest.records.columns import titled
-from piezoest.records.rates import is_decimated, rate_of
+from piezoest.records.rates import rate_among
 from piezoest.records.source import (
     EXTRA,
     LogError,
@@ -41,13 +41,10 @@ class Parquet(Source):
         if not units:
             raise LogError(f"{path}: no columns of numbers in it; there are {', '.join(schema.names)}")
         known = _items(schema)
-        texts = texts_of(known) + [
-            each for field in schema for each in texts_of(_items(field), f"{field.name} ")
-        ]
-        if not any(is_decimated(" ".join(each)) for each in texts):
-            rates = {rate_of(name, value, unit_of(known, f"{name}_unit")) for name, value in known.items()}
-            self.sample_rate = rates.pop() if len(rates := rates - {None}) == 1 else None
-        self.stated_units = units_beside(texts)
+        of_fields = [each for field in schema for each in texts_of(_items(field), f"{field.name} ")]
+        stated = [(name, value, unit_of(known, f"{name}_unit")) for name, value in known.items()]
+        self.sample_rate, self.no_rate = rate_among([*stated, *((*each, "") for each in of_fields)])
+        self.stated_units = units_beside([*texts_of(known), *of_fields])
         super().__init__(path, list(units), [titled(*named) for named in units.items()], len(units))
 
     def count(self, positions: Sequence[int]) -> int:

@@ -1,6 +1,7 @@
 """Sample rates that a file states beside its columns."""
 
 import re
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,18 @@ def rate_of(name: str, value: Any, unit: str = "") -> float | None:
         period, factor = stated_rate(value), OF_PERIODS.get(with_u(unit).strip().lower())
         return None if period is None or factor is None else stated_rate(1.0 / period / factor)
     return stated_rate(value, unit) if name in RATES else None
+
+
+def rate_among(numbers: Iterable[tuple[str, Any, str]]) -> tuple[float | None, str]:
+    """Sample rate that one of some numbers states [Hz]; or None, and why it is not known if they state one.
+
+    `numbers`: name, value and unit of each.
+    """
+    numbers = list(numbers)
+    rates = {rate_of(*number) for number in numbers} - {None}
+    if len(rates) > 1 or (rates and any(is_decimated(f"{name} {value}") for name, value, _ in numbers)):
+        return None, "it states several sample rates, or that only some samples were kept"
+    return (rates.pop() if rates else None), ""
 
 
 def is_decimated(text: str) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from piezoest.records.beside import units_beside
 from piezoest.records.columns import titled
-from piezoest.records.rates import is_decimated, rate_of
+from piezoest.records.rates import rate_among
 from piezoest.records.source import (
     LogError,
     Rows,
@@ -51,7 +51,7 @@ class Table(Source):
 
         with damaged(path, format_), opened() as file:
             found = list(arrays(file))
-            self.sample_rate, self.no_rate = _rate_in((leaf(name), *rest) for name, *rest in found)
+            self.sample_rate, self.no_rate = rate_among(_numbers_in(found, leaf))
             self.stated_units = units_beside(texts(file))
             columns = list(columns_of(found))
             names = [name for name, _, _ in columns]
@@ -108,17 +108,12 @@ class _Part(NamedTuple):
         return self.matrix[part, self.place] if self.axis == 0 else self.matrix[self.place, part]
 
 
-def _rate_in(found: Iterable[Any]) -> tuple[float | None, str]:
-    """Sample rate that numbers state [Hz]; or None, and why it is not known although they state one."""
-    numbers = [
-        (name, np.asarray(values[0:1] if shape_of(values) else values[()]).reshape(()), unit)
-        for name, values, unit in found
-        if np.prod(shape_of(values)) == 1
-    ]
-    rates = {rate_of(*number) for number in numbers} - {None}
-    if len(rates) > 1 or (rates and any(is_decimated(f"{name} {value}") for name, value, _ in numbers)):
-        return None, "it states several sample rates, or that only some samples were kept"
-    return (rates.pop() if rates else None), ""
+def _numbers_in(found: Iterable[Named], name_of: Callable[[str], str]) -> Iterator[Named]:
+    """Arrays of one number each, by the last part of their names."""
+    for name, values, unit in found:
+        if np.prod(shape_of(values)) == 1:
+            number = np.asarray(values[0:1] if shape_of(values) else values[()])
+            yield name_of(name), number.reshape(()), unit
 
 
 def shape_of(values: Any) -> tuple[int, ...]:
