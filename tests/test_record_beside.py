@@ -33,6 +33,16 @@ def test_times_of_few_digits_are_even(tmp_path: Path, fs: float, cut: Any) -> No
     assert "taken as even" in record.notes[-1]
 
 
+@pytest.mark.parametrize("fs", [680.0, 850.0, 950.0])
+def test_few_digits_beside_missing_rows_are_asked_for(tmp_path: Path, fs: float) -> None:
+    path = tmp_path / "log.csv"
+    kept = np.flatnonzero(np.random.default_rng(1).random(2000) > 0.02)
+    rows = (f"{k / fs:.3f},{50 + k % 7},{4 + k % 7}" for k in kept)
+    path.write_text("time_s,u_V,x_um\n" + "\n".join(rows), encoding="utf-8")
+    with pytest.raises(ValueError, match="too few digits; give the sample rate"):
+        read_record(path)
+
+
 @pytest.mark.parametrize("missing", [np.arange(1000, 1012), np.random.default_rng(0).integers(1, 1999, 100)])
 def test_rows_that_are_missing_are_not_a_matter_of_digits(tmp_path: Path, missing: Any) -> None:
     path = tmp_path / "log.csv"

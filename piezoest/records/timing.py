@@ -17,6 +17,9 @@ MENTIONED_JITTER = 0.01
 # Times of too few digits take two steps, a digit apart, and are off by half a digit, or some more; so many
 # long steps are not rows that are missing.
 HALF_STEP, OFTEN = 0.6, 10
+# Rows that are missing by chance leave runs of any length between them. Where the lengths of many runs spread
+# by less than this part of what chance would give, the long steps come of the digits; of few, by still less.
+REGULAR = 0.8
 # Part of the rows, and one in any case, that may repeat the time before; with more, digits are too few.
 MOST_REPEATED = 0.01
 
@@ -84,6 +87,7 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
     largest, jump, moved, words, uneven = 0, 0, False, "", ""
     repeats, repeated = 0, ""
     sums, first, last, least, most = np.zeros(4), (0, 0.0), (0, 0.0), np.inf, 0.0
+    runs = _Runs()
     for rows, known, old in _known(blocks()):  # noqa: B007
         steps, apart = np.diff(known.times), np.diff(known.rows)
 
@@ -122,6 +126,7 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
                 f"{at(k)}is sampled unevenly, a step of {steps[k]:.6g} s where {usual:.6g} s is usual: "
                 "resample the log, or give the sample rate to take rows as even"
             )
+        runs.add(known.rows[1:][gaps > 0.0])
         k = int(np.argmax(gaps))
         if not words or gaps[k] > largest:
             largest, jump = gaps[k], int(known.numbers[k + 1])
@@ -143,6 +148,11 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
             raise LogError(uneven)
         if even:
             absent, largest, moved, jitter = 0, 0, False, apart_from_line
+    if absent and runs.regular():
+        raise LogError(
+            f"{words}, and such steps come too regularly for rows that are missing: time has too few digits; "
+            "give the sample rate to take rows as even"
+        )
     if largest > MOST_MISSING * (rows + absent) or absent > MOST_IN_ALL * (rows + absent):
         raise LogError(f"{words}, {absent} samples are missing in all: cut the log there")
     period = float((last[1] - first[1]) / (last[0] + absent - first[0]))
@@ -158,6 +168,33 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
         rows + absent, float(first[1] - first[0] * period), period, usual if moved else None, jump,
         tuple(notes),
     )  # fmt: skip
+
+
+class _Runs:
+    """Lengths of the runs of rows between long steps of time."""
+
+    def __init__(self) -> None:
+        self.count, self.first, self.last, self.squares = 0, 0.0, 0.0, 0.0
+
+    def add(self, rows: Any) -> None:
+        """Rows behind long steps, later than those before."""
+        if not len(rows):
+            return
+        if not self.count:
+            self.first = self.last = float(rows[0])
+        lengths = np.diff(np.append(self.last, rows))
+        self.squares += float(lengths @ lengths)
+        self.count, self.last = self.count + len(rows), float(rows[-1])
+
+    def regular(self) -> bool:
+        """Whether lengths differ by less than those of rows that are missing by chance."""
+        if self.count <= OFTEN:
+            return False
+        mean = (self.last - self.first) / (self.count - 1)
+        spread = self.squares / (self.count - 1) - mean * mean
+        # Variance of the geometric distribution, and the standard error of its root.
+        part = REGULAR - 1.0 / np.sqrt(self.count)
+        return bool(spread < part * part * mean * max(mean - 1.0, 0.1))
 
 
 def _deviation(
