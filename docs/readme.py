@@ -28,8 +28,8 @@ after the change. *A small first error* and *Rests* give the largest error of th
 the settled error.
 
 The second table is for the simulated stage of the paper, except *others settle*. *Settles*: periods after a
-change until every further error is below {level:g} % of the amplitude (median of all runs), and the share of
-runs that settle; *others settle*: this share on the other stages, in the scenarios that repeat. *First*:
+change until every further error is below {level:g} % of the amplitude (median of the runs whose reference
+repeats), and the share of these runs that settle; *others settle*: this share on the other stages. *First*:
 largest error in the first period after the change. This is a mean over the kinds of change: after a cold
 start it is {cold} % for AdaptiveFeedforward. *Settled*: largest error in the last half of the periods. Both
 are the median over {seeds} seeds ({slow} for the slow estimators), then the geometric mean over the

@@ -104,7 +104,6 @@ def tuned(document: Document) -> report.Table:
 def substitutions(prefix: str, document: Document) -> str:
     plan, conditions = document["plan"], document["conditions"]
     values = {
-        "minutes": f"{document['seconds'] / 60.0:.0f} minutes",
         "runs": document["runs"],
         "seeds": plan["seeds"],
         "level": report.percent(SETTLED) + " %",

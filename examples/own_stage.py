@@ -9,6 +9,7 @@ runs on a simulated stage:
 import signal
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ REST = 0.0  # V, before and after the run
 BIAS = 50.0  # V, at which the reference begins
 SLOPE = 200.0  # V/s, of the ramps
 FARTHEST = 20.0  # µm from the start point: beyond it the program stops
+LONGEST = 0.1  # s, without a reading or with a fault: after it the program stops
 FILE = Path("run.npz")
 
 
@@ -90,7 +92,7 @@ class Run:
             raise RuntimeError("the sensor gives no readings")
         start = float(np.median(readings))
         controller.reset(voltage=BIAS, displacement=start)
-        pace = Pace(RATE)
+        pace, missing, check = Pace(RATE), 0, max(1, round(LONGEST * RATE))
         for k, r in enumerate((start + reference.values).tolist()):
             pace.wait()
             began = time.perf_counter()
@@ -99,12 +101,17 @@ class Run:
             self.voltage = u
             x = self.driver.read()
             controller.learn(u, x)
+            missing = missing + 1 if x is None or np.isnan(x) else 0
             x = np.nan if x is None else x
             for name, value in zip(self.record, (r, u, x, time.perf_counter() - began), strict=True):
                 self.record[name][k] = value
             self.done, self.late = k + 1, pace.late
             if abs(x - start) > FARTHEST:
                 raise RuntimeError(f"the sensor reads {x:.3f} µm, too far from {start:.3f} µm")
+            if missing > check:
+                raise RuntimeError(f"no reading for {LONGEST} s")
+            if k % check == 0 and (fault := controller.status.fault):
+                raise RuntimeError(f"the controller reports a fault: {fault}")
 
     def finish(self) -> None:
         """Bring the voltage to rest, and write what has been recorded."""
@@ -119,12 +126,12 @@ class Run:
             self.driver.close()
 
 
-def main(driver: Any) -> int:
+def main(open_driver: Callable[[], Any]) -> int:
     """Run once; 0 if the reference was followed to its end."""
     reference = pz.signals.triangle(amplitude=3.0, frequency=5.0, periods=10, sample_rate=RATE)  # µm
     controller = pz.AdaptiveFeedforward(RATE, limits=LIMITS)
     pz.warmup(controller)  # compiles or loads everything before the first write
-    run = Run(driver, len(reference))
+    run = Run(open_driver(), len(reference))
     failure = None
     try:
         run.follow(controller, reference)
@@ -140,11 +147,12 @@ def main(driver: Any) -> int:
         print(f"time per sample: median {np.median(busy):.0f} µs, longest {busy.max():.0f} µs")
         off = np.abs(run.record["reference"] - run.record["displacement"])[: run.done]
         period = int(reference.period)
-        first, last = (np.nanmax(part, initial=0.0) for part in (off[:period], off[-period:]))
-        print(f"largest error: first period {first:.3f} µm, last period {last:.3f} µm")
+        for name, part in (("first", off[:period]), ("last", off[-period:])):
+            read = part[np.isfinite(part)]
+            print(f"largest error in the {name} period: {read.max():.3f} µm" if read.size else "no reading")
     print(controller.status, *controller.events, sep="\n")
     return 0 if failure is None else 1
 
 
 if __name__ == "__main__":
-    sys.exit(main(Driver()))
+    sys.exit(main(Driver))

@@ -3,7 +3,7 @@
 import functools
 import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, get_type_hints
 
@@ -12,6 +12,13 @@ import typer
 # Limits of a voltage, of whatever command.
 LOWEST = typer.Option(help="Lowest voltage that stage and amplifier bear [V].")
 HIGHEST = typer.Option(help="Highest voltage that stage and amplifier bear [V].")
+
+
+def warn_if_unbounded(given: Collection[str]) -> None:
+    """Say which limit of the voltage is not among the given ones."""
+    for name, side in (("minimum", "below"), ("maximum", "above")):
+        if name not in given:
+            typer.echo(f"warning: no --{name}: nothing bounds the voltage from {side}", err=True)
 
 
 def grouped(command: Callable[..., None]) -> Callable[..., None]:

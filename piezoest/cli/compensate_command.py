@@ -10,7 +10,7 @@ import typer
 
 from piezoest._errors import Debug, errors
 from piezoest._files import check_targets
-from piezoest._options import HIGHEST, LOWEST, examples, grouped
+from piezoest._options import HIGHEST, LOWEST, examples, grouped, warn_if_unbounded
 from piezoest._progress import LOADING, progress
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ EPILOG = examples(
 )
 
 # Where the voltage is bounded by each limit.
-SIDES = {"minimum": "below", "maximum": "above"}
 # The first step from rest is a jump if it is so many times the largest that follows.
 JUMP = 3.0
 # ... and more than this fraction of the whole swing.
@@ -105,9 +104,7 @@ def compensate(
             f"{output}: {voltage.size} samples at {signal.sample_rate:.6g} Hz, "
             f"{voltage.min():.4g} to {voltage.max():.4g} V"
         )
-        for name, side in SIDES.items():
-            if name not in given:
-                typer.echo(f"warning: no --{name}: nothing bounds the voltage from {side}", err=True)
+        warn_if_unbounded(given)
         if limited := compensator.status.saturated:
             typer.echo(
                 f"warning: {limited} samples ({100.0 * limited / voltage.size:.1f} %) are at a limit of the "

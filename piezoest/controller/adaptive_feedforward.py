@@ -37,8 +37,8 @@ class AdaptiveFeedforward(Face):
     sample_rate : float
         [Hz].
     limits : VoltageLimits
-        Finite voltage range that stage and amplifier tolerate [V]. It protects the stage. At the start, steps
-        of up to a tenth of the range look for the gain.
+        Finite voltage range that stage and amplifier tolerate [V]. It protects the stage. While it looks for
+        the gain, the controller goes up to a quarter of the range away from rest, on either side.
     estimators : tuple of callable, optional
         Up to four classes of estimators (`HysteresisRLS`, `OutputErrorRLS`, `HysteresisEKF`,
         `PrandtlIshlinskiiRLS`), or a ``functools.partial`` of one. Default: ``(HysteresisRLS,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +11,7 @@ import typer
 
 from piezoest._errors import Group
 from piezoest._files import read_object
-from piezoest._options import HIGHEST, LOWEST, examples, grouped, one_of
+from piezoest._options import HIGHEST, LOWEST, examples, grouped, one_of, warn_if_unbounded
 
 if TYPE_CHECKING:
     from piezoest.models import Model
@@ -74,7 +75,7 @@ class Code(Written):
 @app.command(
     epilog=examples(
         "piezoest export c model.json -o firmware --minimum 0 --maximum 150",
-        "piezoest export c model.json -o firmware --estimator rls --sample-rate 50000",
+        "piezoest export c model.json -o firmware --estimator rls --sample-rate 5e4 --minimum 0 --maximum 99",
     )
 )
 @grouped
@@ -95,7 +96,8 @@ def c(
             raise ValueError(f"{source} holds an AdaptiveFeedforward, with all that: give no limits, no rate")
         made = generate(controller, **asdict(code))
     else:
-        made = generate(*_pair(source, stated), **asdict(code))
+        made = generate(*(pair := _pair(source, stated)), **asdict(code))
+        _warn(pair)
     for path in made.write(output):
         typer.echo(path)
 
@@ -135,7 +137,9 @@ def adaptive(
 
 
 @app.command(
-    epilog=examples("piezoest export fmu model.json -o stage.fmu --estimator rls --sample-rate 50000")
+    epilog=examples(
+        "piezoest export fmu stage.json -o a.fmu --estimator rls --sample-rate 5e4 --minimum 0 --maximum 150"
+    )
 )
 @grouped
 def fmu(
@@ -149,6 +153,7 @@ def fmu(
 
     pair = _pair(source, stated)
     typer.echo(generate(*pair, output, **asdict(code), sample_rate=stated.sample_rate))
+    _warn(pair)
 
 
 @app.command(epilog=examples("piezoest export table model.json period.csv -o tables"))
@@ -166,14 +171,14 @@ def table(
     from piezoest.export.tables import table as generate
     from piezoest.records import read_reference
 
-    model, _, _ = _read(source)
+    model, *_ = _read(source)
     signal = read_reference(reference, column=column, sample_rate=sample_rate)
     for path in generate(model, signal, points=points).write(output):
         typer.echo(path)
 
 
-def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
-    """Model, estimator or None, and limits of a JSON file."""
+def _read(path: Path) -> tuple[Model, Any, dict[str, Any], float]:
+    """Model, estimator or None, limits, and the delay that identify measured [s], of a JSON file."""
     import piezoest as pz
     from piezoest._checks import class_named
     from piezoest.models.reading import NO_MODEL, model_from_dict
@@ -195,20 +200,28 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
         except ValueError as error:
             raise ValueError(f"{path}: its estimator is not what to_dict() gave: {error}") from None
     if estimator is not None and described is data:
-        return estimator.model, estimator, limits
+        return estimator.model, estimator, limits, 0.0
+    known = data.get("delay_known", True) and data.get("sample_rate_Hz")
+    delay = float(data.get("delay_samples") or 0.0) / float(known) if known else 0.0
     if "model" not in described:
         raise ValueError(f"{path} names no model: expected the JSON that identify --output wrote")
     try:
-        return model_from_dict(described), estimator, limits
+        return model_from_dict(described), estimator, limits, delay
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+
+
+def _warn(pair: tuple[Any, Any]) -> None:
+    """Say which limit a compensator lacks."""
+    limits = pair[1].limits
+    warn_if_unbounded([name for name in ("minimum", "maximum") if math.isfinite(getattr(limits, name))])
 
 
 def _pair(path: Path, stated: Stated) -> tuple[Any, Any]:
     """Estimator and compensator of a file and the options beside it."""
     import piezoest as pz
 
-    model, estimator, limits = _read(path)
+    model, estimator, limits, delay = _read(path)
     if stated.estimator is not None:
         kinds: dict[str, Any] = {"none": None, "rls": pz.HysteresisRLS, "ekf": pz.HysteresisEKF}
         kind = kinds[stated.estimator]
@@ -219,7 +232,11 @@ def _pair(path: Path, stated: Stated) -> tuple[Any, Any]:
                 f"--estimator {stated.estimator} needs a ColemanHodgdon or a LinearGain, {path} holds a "
                 f"{type(model).__name__}: run identify with --model coleman-hodgdon, or leave --estimator out"
             )
-        estimator = None if kind is None else kind(stated.sample_rate, initial_model=model)
+        if kind is not None and stated.sample_rate is not None:
+            # Without the delay that identify measured, the estimator would take it for hysteresis.
+            estimator = kind(stated.sample_rate, initial_model=model, delay=delay * stated.sample_rate)
+        else:
+            estimator = None
     rate = stated.sample_rate or getattr(estimator, "sample_rate", None)
     own = {"minimum": stated.minimum, "maximum": stated.maximum, "slew_rate": stated.slew_rate}
     limits |= {name: value for name, value in {**own, "sample_rate": rate}.items() if value is not None}

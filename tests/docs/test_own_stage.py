@@ -45,7 +45,7 @@ def driver(program: Any, fails_at: int = -1, error: BaseException | None = None)
 
 def test_it_follows_and_ends_at_rest(program: Any) -> None:
     used = driver(program)
-    assert program.main(used) == 0
+    assert program.main(lambda: used) == 0
     assert used.written.pop() == np.inf  # closed
     record = np.load("run.npz")
     error = record["reference"] - record["displacement"]
@@ -64,7 +64,7 @@ def test_it_follows_and_ends_at_rest(program: Any) -> None:
 def test_a_run_that_is_cut_short_is_kept_and_ends_at_rest(program: Any, error: Any, capsys: Any) -> None:
     ramp = int(program.BIAS / program.SLOPE * program.RATE)
     used = driver(program, ramp + 700, error)
-    assert program.main(used) == 1
+    assert program.main(lambda: used) == 1
     assert f"stopped: {type(error).__name__}" in capsys.readouterr().err
     voltage = np.load("run.npz")["voltage"]
     assert voltage.size == 700
@@ -77,6 +77,35 @@ def test_a_run_that_is_cut_short_is_kept_and_ends_at_rest(program: Any, error: A
 def test_a_displacement_that_is_too_far_stops_the_run(program: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(program, "FARTHEST", 1.0)
     used = driver(program)
-    assert program.main(used) == 1
+    assert program.main(lambda: used) == 1
     assert used.written[-2:] == [program.REST, np.inf]
     assert 0 < np.load("run.npz")["displacement"].size < 2000
+
+
+@pytest.mark.parametrize("reading", [None, np.nan])
+def test_a_sensor_that_is_silent_stops_the_run(program: Any, reading: float | None, capsys: Any) -> None:
+    used, read = driver(program), program.Driver.read
+    done: list[bool] = []
+
+    def silent() -> float | None:
+        done.append(True)
+        return read(used) if len(done) < 500 else reading
+
+    used.read = silent
+    assert program.main(lambda: used) == 1
+    assert used.written[-2:] == [program.REST, np.inf]
+    assert "no reading for 0.1 s" in capsys.readouterr().err
+    assert 400 < np.load("run.npz")["displacement"].size < 700
+
+
+def test_a_fault_stops_the_run(program: Any, capsys: Any) -> None:
+    used, read = driver(program), program.Driver.read
+    frozen: list[float] = []
+
+    def stuck() -> float:
+        frozen.append(read(used) if len(frozen) < 700 else frozen[-1])
+        return frozen[-1]
+
+    used.read = stuck
+    assert program.main(lambda: used) == 1
+    assert "the controller reports a fault" in capsys.readouterr().err

@@ -30,7 +30,9 @@ def program(monkeypatch: pytest.MonkeyPatch) -> Any:
 def test_readme_has_the_figures_of_the_data(program: Any) -> None:
     readme = program("readme")
     _, inside, _ = readme.parts((ROOT / "README.md").read_text(encoding="utf-8"))
-    assert inside == readme.figures(), "run python docs/readme.py"
+    # A change of the code does not need the README anew, but new figures do.
+    made, kept = (re.sub(r"\s+\(since then .*?changed\)", "", text) for text in (readme.figures(), inside))
+    assert made.split() == kept.split(), "run python docs/readme.py"
 
 
 def test_a_page_says_that_it_is_older_than_the_code(

@@ -88,6 +88,18 @@ def test_a_saved_adaptive_feedforward_becomes_code(model: Path) -> None:
     refused(run("fmu", model, "-o", "x.fmu"), "AdaptiveFeedforward")
 
 
+def test_the_delay_that_identify_measured_is_told_the_estimator(model: Path) -> None:
+    found = {"model": json.loads(model.read_text()), "sample_rate_Hz": 1000.0, "delay_samples": 1.5}
+    for known, delay in ((True, 75.0), (False, 0.0)):
+        model.write_text(json.dumps({**found, "delay_known": known}))
+        result = run("c", model, "-o", "out", "--estimator", "rls", "--sample-rate", 50_000, "--minimum", 0)
+        assert result.stderr == "warning: no --maximum: nothing bounds the voltage from above\n"
+        limits = pz.VoltageLimits(minimum=0.0, sample_rate=50_000.0)
+        estimator = pz.HysteresisRLS(50_000.0, initial_model=START, delay=delay)
+        code = pz.export.c(estimator, pz.InverseCompensator(START, limits))
+        assert Path("out/piezoest_controller.c").read_text() == code.source
+
+
 def test_tables_are_written(model: Path) -> None:
     r = pz.signals.triangle(2.0, 5.0, 1, 1000.0)
     write_columns("r.csv", {"time_s": r.time, "reference_um": r.values})
