@@ -135,7 +135,7 @@ def test_more_columns_than_are_wanted_need_numbers(tmp_path: Path) -> None:
         ("t [s],u [V],x [0.1 µm]", "{t},{u},{x}", {"displacement": "x [0.1 µm]"}, "no unit of displacement"),
         ("t,u,x_nm_raw", "{t},{u},{x}", {"displacement": "x_nm_raw"}, "no unit of displacement"),
         ("t,u,x [10^-9 m]", "{t},{u},{x}", {"displacement": "x [10^-9 m]"}, "no unit of displacement"),
-        ("# x in nm\nt,u,x", "{t},{u},{x}", {}, "beside the header stands '# x in nm'"),
+        ("# x in nm\nt,u,x", "{t},{u},{x}", {}, "beside the columns stands '# x in nm'"),
         ("t,u,x,,u,x", "{t},{u},{x},,{u},{x}", {}, "give the number of the one that is, 2 or 5"),
         ("t [s],u [V],Error [nm]", "{t},{u},{x}", {}, "no column for displacement"),
         ("# t, position, amplifier", "{t},{x},{u}", {}, "no column for voltage"),

@@ -182,7 +182,7 @@ def test_frames_and_sheets(tmp_path: Path) -> None:
         Record.from_frame(mixed)
     frame = pandas.DataFrame({"time": T, "voltage": U, "displacement": NM})
     frame.attrs["units"] = {"displacement": "nm"}
-    with pytest.raises(ValueError, match="beside the header"):
+    with pytest.raises(ValueError, match="beside the columns"):
         Record.from_frame(frame)
     book = openpyxl.Workbook()
     for row in (["s", "V", "nm"], ["Time", "Voltage", "Position"], *zip(T, U, NM, strict=True)):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from piezoest.records.columns import quantity_of_unit, with_u
+from piezoest.records.titles import quantity_of_unit, with_u
 
 # Names of attributes and arrays with a word for each column of a matrix.
 NAMES = ("columns", "column_names", "colheaders", "names", "channels", "labels", "header", "variablenames")
@@ -14,7 +14,7 @@ UNITS = ("unit", "units", "column_units")
 # Longer lists are no names of columns.
 MOST_WORDS = 1000
 # Names of texts that may state a unit.
-OF_UNITS = re.compile("unit|label|long_?name|description|dimension", re.I)
+OF_UNITS = re.compile("unit|label|long_?name|description|dimension", re.IGNORECASE)
 # Words of such a text, but for those of µm/V.
 WORD = re.compile(r"(?<![/^\w])[^\W\d_]+(?![/^\w])")
 

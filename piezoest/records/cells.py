@@ -5,13 +5,15 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from piezoest.records.stamps import is_stamp
+from piezoest.records.titles import UNITS
 
-# The last ones are errors of spreadsheets and of C on Windows.
 WORDS = (
     "nan", "-", "--", "---", "na", "n/a", "n.a.", "<na>", "nat", "?", "null", "none", "missing", "-nan",
-    "#n/a", "#na", "#nv", "#div/0!", "#value!", "#wert!", "#ref!", "#bezug!", "#num!", "#zahl!", "#null!",
-    "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "1.#inf", "-1.#inf", "nan(ind)", "-nan(ind)",
+    "nan(ind)", "-nan(ind)", "∞", "-∞", "over", "overflow", "overrange", "overload", "ovld", "ovrflw",
 )  # fmt: skip
+# Errors of spreadsheets: #N/A, #DIV/0!, #WERT!, #¡VALOR!, #NAME?; and of C on Windows: 1.#QNAN, -1.#IND00.
+OF_SHEETS = r"#(?:[¡¿]?[A-ZÄÖÜ0/]+[!?]|N/?[ADV])"
+ERROR = re.compile(rf"{OF_SHEETS}|##+|\*\*+|[-+]?1\.#[A-Z]+\d*", re.IGNORECASE)
 MISSING = sorted({"", *WORDS, *map(str.upper, WORDS), *map(str.capitalize, WORDS), "NaN"})
 # Groups of three never begin with zero, so 0.005 holds none.
 GROUPS = r"[-+]?[1-9]\d{{0,2}}(?:{0}\d{{3}})+"
@@ -22,6 +24,7 @@ EXPONENT = r"(?:[eE][-+]?\d+)?"
 PLAIN = re.compile(rf"[-+]?(\d*)([.,])(\d*){EXPONENT}")
 ONE_GROUP = re.compile(GROUPS.format("[.,]") + EXPONENT)
 WHOLE = re.compile(r"[-+]?\d+")
+WITH_UNIT = re.compile(r"([-+]?\d\S*) +([^\W\d_]+)")
 OTHER = {",": ".", ".": ","}
 GROUPED = {
     thousands: re.compile(rf"{GROUPS.format(re.escape(thousands))}(?:{re.escape(decimal)}\d*)?{EXPONENT}")
@@ -118,17 +121,27 @@ def number(cell: str, style: Style) -> float:
         raise ValueError("a mark that is not for decimals")
     if "_" in text:
         raise ValueError("an underscore in a number")
-    return float(text.replace(",", "."))
+    # Fortran writes 1.0D+00.
+    return float(re.sub(r"(?<=[\d.])[dD](?=[-+]?\d)", "e", text.replace(",", ".")))
 
 
 def is_missing(cell: str) -> bool:
     """Whether a cell says that there is no number."""
-    return cell.strip().lower() in ("", *WORDS)
+    text = cell.strip()
+    return text.lower() in ("", *WORDS) or ERROR.fullmatch(text) is not None
+
+
+def split_cell(cell: str) -> tuple[str, str]:
+    """Number and unit of a cell such as ``0.001 sec``, as MATLAB writes durations; else the cell alone."""
+    plain = cell.strip()
+    found = WITH_UNIT.fullmatch(plain) if plain[-1:].isalpha() else None
+    known = found is not None and any(found[2].lower() in units for units in UNITS.values())
+    return (found[1], found[2]) if found and known else (plain, "")
 
 
 def is_number(cell: str) -> bool:
     """Whether a cell may hold a number, a missing one or a time stamp, in whatever style."""
-    text = cell.strip()
+    text, _ = split_cell(cell)
     if is_missing(text) or is_stamp(text) or any(each.fullmatch(text) for each in GROUPED.values()):
         return True
     try:

@@ -3,20 +3,19 @@
 import itertools
 import re
 
-from piezoest.records.cells import ONE_GROUP, WORDS, Style, number
-from piezoest.records.columns import (
+from piezoest.records.cells import OF_SHEETS, ONE_GROUP, Style, number
+from piezoest.records.rates import is_decimated, rate_of, stated_rate
+from piezoest.records.titles import (
     quantities_called,
     quantity_of_unit,
     split_unit,
     with_u,
     with_units,
 )
-from piezoest.records.rates import is_decimated, rate_of, stated_rate
 
 COMMENTS = ("#", "%")
 # The beginning of a comment, but not of a row whose first cell is an error of a spreadsheet.
-ERRORS = "|".join(re.escape(word) for word in WORDS if word.startswith(COMMENTS))
-COMMENT = rf"(?!(?i:{ERRORS})[^\S\n]*(?:[-+.,;|\d\n]|\Z))[#%]"
+COMMENT = rf"(?!(?i:{OF_SHEETS})[^\S\n]*(?:[-+.,;|\d\n]|\Z)|##+[,;|\t])[#%]"
 # A line ``sample rate [kHz]: 10`` or ``SAMPLE_TIME = 5e-05``, with the unit beside the name or the number.
 ENTRY = re.compile(
     r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.,\deE]+)\s*([^\W\d][\w/]*)?\s*"
@@ -24,10 +23,12 @@ ENTRY = re.compile(
 # Words before a list of units, and before a unit.
 UNIT, BEFORE = ("unit", "units", "einheit", "einheiten", "unité", "unités"), ("in", "is", "are")
 # The unit of a rate or period in a line of its own.
-UNIT_APART = re.compile(r"(?:rate|fs|period|interval|dt|ts|time)[ _]*units?\W+(\w+)", re.I)
+UNIT_APART = re.compile(r"(?:rate|fs|period|interval|dt|ts|time)[ _]*units?\W+(\w+)", re.IGNORECASE)
 # A line ``NAME0 = Actual Position of Axis 1``, of which Physik Instrumente's GCS arrays have one a column, or
 # ``column 1: time [s]``.
-NUMBERED_NAME = re.compile(r"\s*(?:name|col\.?|column|spalte|channel)?\s*(\d+)\s*[=:)]\s*(\D.*?)\s*", re.I)
+NUMBERED_NAME = re.compile(
+    r"\s*(?:name|col\.?|column|spalte|channel)?\s*(\d+)\s*[=:)]\s*(\D.*?)\s*", re.IGNORECASE
+)
 
 
 def is_comment(line: str) -> bool:

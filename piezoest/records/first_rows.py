@@ -5,8 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.records.columns import UNITS, Column, choose, has_column, split_unit
+from piezoest.records.columns import Column, choose, has_column
 from piezoest.records.source import LogError, Source
+from piezoest.records.titles import UNITS, split_unit
 
 # Rows by which a sample rate that is given is compared with the column of time, and how near it must be.
 FIRST_ROWS, SAME_RATE = 1000, 0.01

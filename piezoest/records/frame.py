@@ -13,9 +13,18 @@ from piezoest import _extras
 from piezoest._checks import FloatArray
 from piezoest.records.beside import units_beside
 from piezoest.records.cells import Style, is_missing
-from piezoest.records.columns import NAMES, split_unit, titled, with_units
 from piezoest.records.comments import entries_in, rate_in, with_stated_units
-from piezoest.records.source import EXTRA, LogError, Rows, Source, check_size, damaged, floats, shown
+from piezoest.records.source import (
+    EXTRA,
+    LogError,
+    Rows,
+    Source,
+    check_size,
+    damaged,
+    floats,
+    shown,
+)
+from piezoest.records.titles import NAMES, split_unit, titled, with_units
 
 TIMES = datetime.date | datetime.time | datetime.timedelta
 NO_FLOATS = [datetime.datetime, datetime.date, datetime.time, datetime.timedelta]
@@ -145,12 +154,15 @@ def open_sheet(path: Path) -> Frame:
         # A sample of which only one cell is not missing.
         begins -= 1
     table = sheet.iloc[begins:].dropna(axis=1, how="all")
-    table = table.loc[: table.last_valid_index()]
+    # A line below the rows, such as of means, has no time.
+    table = table.loc[: table.iloc[:, 0].last_valid_index()]
     above = sheet.iloc[:begins][table.columns].dropna(how="all")
     lines = [[str(name).strip() for name in line] for line in above.fillna("").to_numpy()]
     names = lines[-1] if lines else []
     if len(lines) > 1:
-        names = with_units(lines[-2], names) or with_units(names, lines[-2]) or names
+        # The names of a group stand above them.
+        own = [name or group for name, group in zip(names, lines[-2], strict=True)]
+        names = with_units(lines[-2], names) or with_units(names, lines[-2]) or own
     # A title above the table is no header.
     header = names if sum(map(bool, names)) > 1 else []
     # Other lines above may be longer than the table.
@@ -160,6 +172,7 @@ def open_sheet(path: Path) -> Frame:
     found = Frame(
         path, series, header, header, begins + 1, "a spreadsheet is read as a whole: save the log as CSV"
     )
+    found.note_factors(map(" ".join, said))
     found.stated_units, found.sample_rate = units, rate_in(entries_in(said), Style())
     if len(sheets) > 1:
         found.note(f"sheet {shown(title)!r} of {len(sheets)} is read")

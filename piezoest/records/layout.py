@@ -4,18 +4,27 @@ import csv
 import itertools
 import re
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
 from piezoest.records import scopes
-from piezoest.records.cells import Marks, Style, is_number, style_of
-from piezoest.records.columns import LITTLE_WORDS, counted_names, names_columns, names_other_order, with_units
+from piezoest.records.cells import Marks, Style, is_missing, is_number, split_cell, style_of
 from piezoest.records.comments import bare, entries_in, is_comment, numbered_names, rate_in, with_stated_units
 from piezoest.records.lines import LONGEST_FOOTER, check_table, chunks, encoding_of, end_of_rows
 from piezoest.records.source import LogError
 from piezoest.records.stamps import Clock, is_stamp
+from piezoest.records.titles import (
+    LITTLE_WORDS,
+    counted_names,
+    names_columns,
+    names_other_order,
+    quantities_called,
+    quantity_of_unit,
+    titled,
+    with_units,
+)
 
 # Blank lines among the others: more are the way the file is written, fewer are samples that were lost.
 MOST_BLANK = 0.1
@@ -23,12 +32,16 @@ MOST_BLANK = 0.1
 HEAD_LINES, STAMP_ROWS = 10_000, 100
 # Lines that instruments write above the header, at most.
 LONGEST_PREAMBLE = 200
+# Lines of a header: names, units, comments, types.
+LONGEST_HEADER = 8
 # A name with a unit in brackets, among other words.
 WITH_UNIT = re.compile(r"[^\s,;|]+\s*[\[(][^\s\])]+[\])]")
 # What a line with a time stamp has.
 MAYBE_STAMP = re.compile(r"[:T]|(?<!\d)(?:19|20)\d{6}_?\d{6}")
 # What may stand around names in a comment, and how long a name is at most.
-LIST = re.compile(r"\s*(?:(?:columns?|fields?|header|names|spalten)\s*[:=])?\s*[\[(]?(.*?)[\])]?\s*", re.I)
+LIST = re.compile(
+    r"\s*(?:(?:columns?|fields?|header|names|spalten)\s*[:=])?\s*(?:[\[(](.*)[\])]|(.*?))\s*", re.IGNORECASE
+)
 LONGEST_NAME = 30
 # A byte order mark that is not the first, and a blank without width.
 UNSEEN = "\N{ZERO WIDTH NO-BREAK SPACE}\N{ZERO WIDTH SPACE}"
@@ -53,6 +66,8 @@ class Layout(NamedTuple):
     stamps: dict[int, Clock]  # of the columns that hold time stamps
     sample_rate: float | None = None  # that lines above the rows state [Hz]
     units: Mapping[str, str] = MappingProxyType({})  # that such lines state, and the lines
+    lines: Sequence[str] = ()  # above the rows
+    cell_units: Mapping[int, str] = MappingProxyType({})  # of columns whose cells hold one behind the number
 
 
 def layout_of(path: Path) -> Layout:
@@ -79,8 +94,11 @@ def layout_of(path: Path) -> Layout:
         header = _named_in_comments(path, above, rows[0][1], delimiter)
     elif below := [line for place, line in comments if filled[-len(rows) - 1][0] < place < rows[0][0]]:
         header = with_units(header, _titles(path, bare(below[-1]), delimiter, len(header))) or header
+    cell_units = {i: unit for i, cell in enumerate(_cells(path, rows[0][1])) if (unit := split_cell(cell)[1])}
+    header = [titled(name, cell_units.get(i, "")) for i, name in enumerate(header)]
     header = scopes.with_stated_units(header, preamble)
-    header, units = with_stated_units(header, [*above, *map(" ".join, preamble)])
+    said = [*above, *map(" ".join, preamble)]
+    header, units = with_stated_units(header, said)
     texts = [line for _, line in rows]
     stamps: dict[int, Clock] = {}
     if any(map(MAYBE_STAMP.search, texts[:STAMP_ROWS])):
@@ -92,7 +110,21 @@ def layout_of(path: Path) -> Layout:
     style = _style(path, _without_footer(texts, delimiter), delimiter)
     begins = rows[0][0]
     rate = rate_in([*above, *entries_in(preamble), *scopes.entries(preamble)], style)
-    return Layout(path, encoding, delimiter, header, width, begins, skip_blank, style, stamps, rate, units)
+    return Layout(
+        path,
+        encoding,
+        delimiter,
+        header,
+        width,
+        begins,
+        skip_blank,
+        style,
+        stamps,
+        rate,
+        units,
+        said,
+        cell_units,
+    )
 
 
 def _delimiter(line: str) -> str:
@@ -120,7 +152,7 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
     if begins < 2 or like_first or len(head) < min(len(filled), LONGEST_PREAMBLE):
         return _headed_by_first(path, filled, head)
     upper, lower = head[begins - 2 : begins]
-    header = with_units(upper, lower) or with_units(lower, upper) or lower
+    header = _of_several([upper, lower]) or lower
     if len(header) != len(head[begins]):
         # Nothing says what is what: columns go by their numbers.
         header = [str(k + 1) for k in range(len(head[begins]))]
@@ -141,12 +173,42 @@ def _headed_by_first(
         second = split(path, [filled[1][1]], mark)[0] if mark == " " else head[1]
         if len(header) != len(second):
             header = _titles(path, filled[0][1], mark, len(second))
-    if header and [row[0] for row in head[1:3]] == ["1", "2"] and len(head[1]) == len(first) + 1:
-        # R writes no name above its column of numbers.
+    if header and _counts(row[0] for row in head[1:3]) and len(head[1]) == len(first) + 1:
+        # R and pandas write no name above their column of numbers.
         header = ["", *first]
-    if header and len(head) > 2 and (named := with_units(header, head[1])):
-        header, begins = named, 2
+    rows = (k for k, row in enumerate(head) if k > 0 and any(map(_is_value, row)))
+    above = head[: next(rows, 1)] if header else []
+    several = _of_several(above) if 1 < len(above) <= LONGEST_HEADER else []
+    if several:
+        header, begins = several, len(above)
     return mark, header, filled[begins:]
+
+
+def _counts(cells: Iterable[str]) -> bool:
+    """Whether cells number their rows, from 0 or 1."""
+    return list(cells) in (["0", "1"], ["1", "2"])
+
+
+def _is_value(cell: str) -> bool:
+    """Whether a cell is a number, and not missing."""
+    return is_number(cell) and not is_missing(cell)
+
+
+def _of_several(lines: list[list[str]]) -> list[str]:
+    """Header of several lines: names, units, and others that say something else; none if it is not clear."""
+    # Whole numbers may be those of channels.
+    values = (cell for cell in itertools.chain(*lines) if _is_value(cell) and not cell.isdigit())
+    if len(set(map(len, lines))) > 1 or any(values):
+        return []
+    units = next((line for line in lines if with_units([""] * len(line), line)), None)
+    rest = [line for line in lines if line is not units]
+    if not rest or any(map(quantity_of_unit, itertools.chain(*rest))):
+        return []
+    names = next(filter(names_columns, rest), rest[0])
+    # The names of a group stand above them.
+    others = [line for line in rest if line is not names]
+    plain = [name or next(filter(None, above), "") for name, *above in zip(names, *others, strict=True)]
+    return with_units(plain, units) if units else plain
 
 
 def _named_in_comments(path: Path, comments: list[str], row: str, delimiter: str) -> list[str]:
@@ -168,18 +230,25 @@ def _named_in_comments(path: Path, comments: list[str], row: str, delimiter: str
 def _list_in(comment: str) -> str:
     """Names in a comment, without what a program wrote around them: ``columns: ['time', 'x']``."""
     found = LIST.fullmatch(comment)
-    return re.sub("['\"]", "", found[1]) if found else comment
+    return re.sub("['\"]", "", found[1] or found[2]) if found else comment
 
 
 def _unknown_names(path: Path, comments: list[str], width: int) -> list[str]:
     """Cells of the last comment that may be names, as no numbers and no sentence: better ask than guess."""
-    mark = _delimiter(_list_in(bare(comments[-1]))) if comments else " "
-    if mark == " ":
+    said = _list_in(bare(comments[-1])) if comments else ""
+    if not said.strip() or (_delimiter(said) == " " and not _has_names(said)):
         return []
-    cells = [cell.strip() for cell in split(path, [_list_in(bare(comments[-1]))], mark)[0]]
+    cells = _cells(path, said)
     words = {word.lower() for cell in cells for word in cell.split()}
     short = all(0 < len(cell) <= LONGEST_NAME and not is_number(cell) for cell in cells)
     return cells if len(cells) == width and short and LITTLE_WORDS.isdisjoint(words) else []
+
+
+def _has_names(text: str) -> bool:
+    """Whether a word is a name of a quantity or of a channel, and not all are single letters."""
+    words = text.lower().split()
+    known = any(quantities_called(word) or re.fullmatch(r"ch\d+", word) for word in words)
+    return known and max(map(len, words)) > 1
 
 
 def _titles(path: Path, line: str, delimiter: str, width: int) -> list[str]:
@@ -194,7 +263,12 @@ def _titles(path: Path, line: str, delimiter: str, width: int) -> list[str]:
 
 def is_row(line: str, delimiter: str) -> bool:
     """Whether a line begins with a number, as rows do."""
-    return is_number(line.strip().split(None if delimiter == " " else delimiter, 1)[0].strip(' "'))
+    return is_number(first_cell(line, delimiter))
+
+
+def first_cell(line: str, delimiter: str) -> str:
+    """First cell of a line."""
+    return line.strip(" ").split(None if delimiter == " " else delimiter, 1)[0].strip(' "')
 
 
 def _without_footer(lines: list[str], delimiter: str) -> list[str]:
@@ -210,7 +284,7 @@ def _is_row_of_numbers(cells: list[str]) -> bool:
 
 
 def _numeric(*rows: list[str]) -> bool:
-    return all(is_number(cell) for row in rows for cell in row)
+    return all(all(map(is_number, row)) and any(map(_is_value, row)) for row in rows)
 
 
 def _style(path: Path, lines: list[str], delimiter: str) -> Style:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import bz2
 import codecs
 import contextlib
 import gzip
 import io
+import lzma
 import re
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, cast
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -24,15 +26,19 @@ LONGEST_LINE = 1 << 20
 # Bytes that are read at a time, at least and at most, and about those of a row.
 FEWEST_BYTES, MOST_BYTES, BYTES_OF_A_ROW = 1 << 14, 1 << 20, 32
 # Lines that a program writes behind the last row, at most.
-LONGEST_FOOTER = 20
+LONGEST_FOOTER, LONGEST_MEANS = 20, 4
 # Characters that no text has, unless as UTF-16.
 CONTROL = frozenset(range(32)) - frozenset(b"\t\n\v\f\r\x1a\x1b")
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 UTF_32 = (b"\xff\xfe\0\0", b"\0\0\xfe\xff")
 UNMARKED = {"utf-16-le": 1, "utf-16-be": 0}  # and which byte of two is zero in Latin letters
-PACKED = b"\x1f\x8b"
+PACKED: dict[bytes, Callable[[Any], Any]] = {
+    b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xfd7zXZ\0": lzma.open
+}  # fmt: skip
+# Spreadsheets write a blank line as marks alone.
+BLANK = " \t\r\v\f,;|"
 # A line that is blank or a comment, in a text that begins with the end of a line.
-SPECIAL = re.compile(rf"\n[^\S\n]*(?:{COMMENT}|\n|\Z)")
+SPECIAL = re.compile(rf"\n[^\S\n]*(?:{COMMENT}|[,;|\s]*(?:\n|\Z))")
 
 
 class Lines(NamedTuple):
@@ -63,15 +69,20 @@ class Lines(NamedTuple):
         return first, Lines(self.numbers[-last:], "\n".join(behind), self.done)
 
 
+def unpacking(start: bytes) -> Callable[[Any], Any] | None:
+    """What unpacks a file that begins so; None if it is not packed."""
+    return next((unpack for mark, unpack in PACKED.items() if start.startswith(mark)), None)
+
+
 @contextlib.contextmanager
 def unpacked(path: Path) -> Iterator[tuple[BinaryIO, BinaryIO]]:
-    """Open a file: as it is, whose position says how much is read, and what is in it if gzip packed it."""
+    """Open a file: as it is, whose position says how much is read, and what is in it if it is packed."""
     with path.open("rb") as raw:
-        packed = raw.read(2) == PACKED
+        unpack = unpacking(raw.read(6))
         raw.seek(0)
         try:
-            yield raw, cast(BinaryIO, gzip.GzipFile(fileobj=raw)) if packed else raw
-        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+            yield raw, raw if unpack is None else unpack(raw)
+        except (gzip.BadGzipFile, EOFError, zlib.error, lzma.LZMAError) as error:
             raise LogError(f"{path}: cannot be unpacked, it may be truncated: {error}") from None
 
 
@@ -158,10 +169,10 @@ def sample_lines(
             if is_comment(line):
                 left_out(number, line)
                 continue
-            if line.strip():
+            if line.strip(BLANK):
                 kept += [*blank, (number, line)]
                 blank.clear()
-            elif not skip_blank:
+            elif not skip_blank or line.strip():
                 blank.append((number, ""))
         if kept:
             yield Lines.of(kept, done)
@@ -173,11 +184,15 @@ def end_of_rows(lines: list[str], is_row: Callable[[str], bool]) -> int:
 
 
 def without_footer(
-    blocks: Iterable[Lines], is_row: Callable[[str], bool], left_out: Callable[[int, str], object]
+    blocks: Iterable[Lines],
+    is_row: Callable[[str], bool],
+    begun: Callable[[str], bool],
+    left_out: Callable[[int, str], object],
 ) -> Iterator[Lines]:
     """Lines but a few behind the last row, of which `left_out` is told the number and text of the first.
 
-    Where the first line is no row either, rows cannot be told from other lines, and all are left.
+    Where the first line is no row either, rows cannot be told from other lines, and all are left. Lines whose
+    first cell is empty are no rows where all others have one: means stand below the columns so.
     """
     held: Lines | None = None
     known = False
@@ -191,6 +206,9 @@ def without_footer(
         return
     lines = held.text.split("\n")
     kept = end_of_rows(lines, is_row)
+    empty = [k for k in range(kept) if lines[k].strip() and not begun(lines[k])]
+    if 0 < len(empty) <= LONGEST_MEANS and empty[0] == kept - len(empty) > 0:
+        kept = empty[0]
     footer = [k for k in range(kept, len(lines)) if lines[k].strip()]
     if known and 0 < len(footer) <= LONGEST_FOOTER:
         left_out(int(held.numbers[footer[0]]), lines[footer[0]])

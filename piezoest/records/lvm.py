@@ -13,11 +13,11 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.records.cells import Style, number
-from piezoest.records.columns import titled
 from piezoest.records.layout import Layout
 from piezoest.records.lines import Lines, chunks, encoding_of
 from piezoest.records.source import LogError, Rows
 from piezoest.records.text import Text
+from piezoest.records.titles import titled
 
 SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";"}
 # The line with the names of the columns begins with this; rows follow it.

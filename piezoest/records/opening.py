@@ -4,17 +4,18 @@ import importlib
 import zipfile
 from pathlib import Path
 
-from piezoest.records.lines import PACKED, beginning, encoding_of
+from piezoest.records.lines import beginning, encoding_of, unpacking
 from piezoest.records.source import LogError, Source
 
 OF_SHEETS = "frame:open_sheet"
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat")
 SHEET_ENDINGS = (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods")
 ARCHIVE = b"PK\x03\x04"
+HDF5, BLOCKS = b"\x89HDF\r\n\x1a\n", (0, 512, 1024, 2048)
 # Name, what files begin with, endings of their names, and what opens them.
 FORMATS: tuple[tuple[str, tuple[bytes, ...], tuple[str, ...], str], ...] = (
     ("Parquet", (b"PAR1",), (".parquet", ".pq"), "parquet:Parquet"),
-    ("HDF5", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), (".h5", ".hdf5", ".hdf", ".he5"), "hdf5:open_hdf5"),
+    ("HDF5", (HDF5, b"MATLAB 7.3"), (".h5", ".hdf5", ".hdf", ".he5"), "hdf5:open_hdf5"),
     ("MATLAB", (b"MATLAB 5.0",), (), "formats:open_mat"),
     ("NumPy", (b"\x93NUMPY",), (".npy",), "formats:open_npy"),
     ("TDMS", (b"TDSm",), (".tdms",), "formats:Tdms"),
@@ -29,11 +30,11 @@ OF_SPREADSHEETS = {"xl/workbook.xml", "xl/workbook.bin", "content.xml"}
 
 def open_source(path: Path) -> Source:
     """Open a log by what it begins with, or else by the ending of its name."""
-    start, ending = beginning(path, 128), path.suffix.lower()
+    start, ending = _signature(path), path.suffix.lower()
     if not start.strip():
         raise LogError(f"{path}: the file is empty")
     with path.open("rb") as file:
-        packed = file.read(2) == PACKED
+        packed = unpacking(file.read(6)) is not None
     opener = "text:open_text"
     for name, beginnings, endings, function in FORMATS:
         if start.startswith(beginnings) and not (start.startswith(ARCHIVE) and _is_other(path, name)):
@@ -51,6 +52,12 @@ def open_source(path: Path) -> Source:
     # What a format needs is imported only now.
     module, _, function = opener.partition(":")
     return getattr(importlib.import_module(f"piezoest.records.{module}"), function)(path)
+
+
+def _signature(path: Path) -> bytes:
+    """First bytes of a file; of HDF5 those behind a block of the user, which Julia writes."""
+    begun = beginning(path, max(BLOCKS) + len(HDF5))
+    return next((HDF5 for place in BLOCKS if begun[place:].startswith(HDF5)), begun[:128])
 
 
 def _is_text(path: Path) -> bool:

@@ -8,7 +8,6 @@ import numpy as np
 
 from piezoest import _extras
 from piezoest.records.beside import UNITS, texts_of, unit_of, units_beside
-from piezoest.records.columns import titled
 from piezoest.records.rates import rate_among
 from piezoest.records.source import (
     EXTRA,
@@ -19,6 +18,7 @@ from piezoest.records.source import (
     damaged,
     floats,
 )  # fmt: skip
+from piezoest.records.titles import titled
 
 
 class Parquet(Source):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from piezoest.records.columns import UNITS, with_u
+from piezoest.records.titles import UNITS, with_u
 
 # Names under which a file may state its sample rate [Hz], or the time between samples [s], in lower case.
 RATES = (
@@ -24,7 +24,11 @@ OF_RATES = {
 # What the units are in s.
 OF_PERIODS = {"": 1.0, **UNITS["time"]}
 # A file that keeps one sample of several states a rate that may be that of all of them.
-DECIMATED = re.compile(r"(?:decimat|downsampl|untersetz|record_table_rate|\bevery)\D*(\d+)", re.I)
+DECIMATED = re.compile(
+    r"(?:decimat|\bdec\b|down_?sampl|sub_?-?sampl|untersetz|record_table_rate|\bevery|reduction|divider|\bskip|"
+    r"\bavg|averag|binn)\D*(\d+)",
+    re.IGNORECASE,
+)
 
 
 def stated_rate(value: Any, unit: str = "") -> float | None:

@@ -3,7 +3,7 @@
 import re
 from itertools import pairwise
 
-from piezoest.records.columns import titled, with_units
+from piezoest.records.titles import titled, with_units
 
 # Rigol: ``X,CH1,CH2,Start,Increment`` above ``Sequence,Volt,Volt,0.0,2e-05``.
 START, INCREMENT, SEQUENCE = "start", "increment", "sequence"

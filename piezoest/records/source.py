@@ -2,7 +2,7 @@
 
 import abc
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.records.titles import states_factor
 
 EXTRA = "formats"
 # Rows that are read at a time where nobody says how many: some megabytes.
@@ -56,6 +57,12 @@ class Source(abc.ABC):
         """Say once what had to be assumed."""
         if said not in self.notes:
             self.notes.append(said)
+
+    def note_factors(self, lines: Iterable[str]) -> None:
+        """Say which lines state a factor that is not used: what stands beside columns may be of others."""
+        for line in lines:
+            if states_factor(line):
+                self.note(f"{shown(line)!r} is not used: if it is of a column, say by units= what 1 in it is")
 
     @abc.abstractmethod
     def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:

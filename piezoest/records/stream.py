@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import WILDEST, FloatArray, instance, integer, positive
-from piezoest.records.columns import BASE_UNITS, Column, choose
+from piezoest.records.columns import Column, choose
 from piezoest.records.first_rows import (
     FIRST_ROWS,
     check_first_column,
@@ -19,6 +19,7 @@ from piezoest.records.first_rows import (
 from piezoest.records.opening import open_source
 from piezoest.records.source import ROWS, Rows, Source, counted
 from piezoest.records.timing import Timing, placed, scan
+from piezoest.records.titles import BASE_UNITS
 
 FEWEST_ROWS = 10
 

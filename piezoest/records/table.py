@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest.records.beside import units_beside
-from piezoest.records.columns import titled
 from piezoest.records.rates import rate_among
 from piezoest.records.source import (
     LogError,
@@ -19,6 +18,7 @@ from piezoest.records.source import (
     finite,
     floats,
 )  # fmt: skip
+from piezoest.records.titles import titled
 
 # Name, array and unit.
 Named = tuple[str, Any, str]
@@ -53,6 +53,7 @@ class Table(Source):
             found = list(arrays(file))
             self.sample_rate, self.no_rate = rate_among(_numbers_in(found, leaf))
             self.stated_units = units_beside(texts(file))
+            said = [f"{name}: {text}" for name, text in texts(file)]
             columns = list(columns_of(found))
             names = [name for name, _, _ in columns]
             self._lengths = [shape_of(values)[0] for _, values, _ in columns]
@@ -68,6 +69,7 @@ class Table(Source):
         alone = len(names) > 1 and not any(unit for _, _, unit in columns)
         alone = alone and all(name.endswith(f":{i}") for i, name in enumerate(names, 1))
         super().__init__(path, *(([], []) if alone else (names, titles)), len(names))
+        self.note_factors(said)
         self.whole = whole
         self._names = names
 
@@ -127,6 +129,10 @@ def columns_of(found: Iterable[Named]) -> Iterator[Named]:
         shape = shape_of(values)
         if np.prod(shape) <= 1:
             continue
+        if len(shape) > 2 and sum(length > 1 for length in shape) < 3:
+            # Simulink keeps a signal as 1×1×N.
+            values = np.squeeze(values[...])
+            shape = values.shape
         if len(shape) == 1:
             yield name, values, unit
         elif len(shape) == 2:

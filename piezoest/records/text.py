@@ -11,12 +11,12 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.records.cells import MISSING, Marks, is_missing, is_number, number
-from piezoest.records.columns import titled
-from piezoest.records.comments import states_units
-from piezoest.records.layout import PART, Layout, check_columns, is_row, layout_of, split
+from piezoest.records.comments import bare, states_units
+from piezoest.records.layout import PART, Layout, check_columns, first_cell, is_row, layout_of, split
 from piezoest.records.lines import Lines, sample_lines, without_footer
 from piezoest.records.source import LogError, Rows, Source, finite, floats, shown
 from piezoest.records.stamps import Onward, times_of
+from piezoest.records.titles import titled
 
 
 class Text(Source):
@@ -29,6 +29,8 @@ class Text(Source):
         self.layout = layout
         self.sample_rate, self.stated_units = layout.sample_rate, layout.units
         self.size = layout.path.stat().st_size
+        self._commented = False  # whether a row that is a comment has been noted
+        self.note_factors(layout.lines)
         self._marks: defaultdict[int, Marks] = defaultdict(Marks)
         if layout.style.guessed:
             self.note(f"{layout.style.guessed!r} and the like: the comma is taken for decimals, no thousands")
@@ -42,10 +44,17 @@ class Text(Source):
         found = sample_lines(
             layout.path, layout.encoding, layout.begins, layout.skip_blank, rows, self._skipped
         )
-        return without_footer(found, lambda line: is_row(line, layout.delimiter), self._left_out)
+        return without_footer(
+            found,
+            lambda line: is_row(line, layout.delimiter),
+            lambda line: first_cell(line, layout.delimiter) != "",
+            self._left_out,
+        )
 
     def _skipped(self, place: int, line: str) -> None:
-        if states_units(line):
+        row = is_row(bare(line) or "-", self.layout.delimiter) and not self._commented
+        self._commented |= row
+        if row or states_units(line):
             self.note(f"line {place}: {shown(line)!r} stands between rows, and is skipped")
 
     def _left_out(self, place: int, line: str) -> None:
@@ -84,7 +93,11 @@ class Text(Source):
             cells = {i: table[i] for i in positions}
         else:
             rows = self._rows(block)
-            cells = {i: [row[i].strip() if i < len(row) else "" for row in rows] for i in positions}
+            units = self.layout.cell_units
+            cells = {
+                i: [row[i].strip().removesuffix(units.get(i, "")) if i < len(row) else "" for row in rows]
+                for i in positions
+            }
         return [self._column(block, i, cells[i]) for i in positions]
 
     def _check_marks(self, block: Lines) -> None:

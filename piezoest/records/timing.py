@@ -101,6 +101,8 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
             repeated = repeated or f"{place} {known.repeating[0]}"
         if np.any(steps < 0.0):
             k = int(np.argmax(steps < 0.0))
+            if np.all(steps < 0.0):
+                raise LogError(f"{at(k)}falls from row to row: put the rows in the order of time")
             raise LogError(
                 f"{at(k)}does not increase: {known.times[k + 1]:.15g} s after {known.times[k]:.15g} s; cut "
                 "the log where the clock starts again, or give the sample rate to take rows as even"
@@ -148,6 +150,8 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
             raise LogError(uneven)
         if even:
             absent, largest, moved, jitter = 0, 0, False, apart_from_line
+    if runs.end_to_end(rows):
+        raise LogError(f"{words}, and from there on: the sample rate changes, cut the log there")
     if absent and runs.regular():
         raise LogError(
             f"{words}, and such steps come too regularly for rows that are missing: time has too few digits; "
@@ -185,6 +189,10 @@ class _Runs:
         lengths = np.diff(np.append(self.last, rows))
         self.squares += float(lengths @ lengths)
         self.count, self.last = self.count + len(rows), float(rows[-1])
+
+    def end_to_end(self, rows: int) -> bool:
+        """Whether all steps are long from some row on."""
+        return self.count > OFTEN and self.last - self.first == self.count - 1 and self.last == rows - 1
 
     def regular(self) -> bool:
         """Whether lengths differ by less than those of rows that are missing by chance."""
