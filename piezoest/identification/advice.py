@@ -29,6 +29,7 @@ SHORT = 0.01
 def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
     """All there is to say, the log's own doubts first."""
     held_out = found.record.voltage[found.trained :]
+    beyond = beyond_sentences("The held-out part", found.learnt_on, held_out, found.sample_rate)
     return (
         *(each.sentence for each in found.findings),
         *_left_out(found),
@@ -36,14 +37,14 @@ def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
         *_creep(found),
         *_centre(data),
         *_remainder(found),
-        *_along(found),
-        *beyond_sentences("The held-out part", found.learnt_on, held_out, found.sample_rate),
+        *_drift(found),
+        *(beyond or _worse_later(found)),
     )
 
 
 def unsettled_sentence(seconds: float) -> str:
     """That the start was left out, which lasts so long [s]."""
-    why = "the stage had not settled, or had gone another way before"
+    why = "the stage had not settled, or came from voltages outside the log"
     return f"The first {seconds:.3g} s do not fit the rest ({why}): left out."
 
 
@@ -83,8 +84,8 @@ def _left_out(found: Identification) -> list[str]:
     spikes = int(np.count_nonzero(flaws.spikes[: found.trained])) + fit.spikes
     if spikes:
         said.append(
-            f"{spikes} of the fitted samples {'is' if spikes == 1 else 'are'} off the rest alone, as spikes "
-            "of a sensor are: left out."
+            f"{spikes} of the fitted samples {'is a spike' if spikes == 1 else 'are spikes'} of the sensor: "
+            "left out."
         )
     if fit.jumps.size:
         said.append(
@@ -172,7 +173,7 @@ def _remainder(found: Identification) -> list[str]:
         said.append(
             f"A straight line predicts the held-out part about as well ({found.line_held_out.rms:.2g} µm "
             f"rms, the model {found.held_out.rms:.2g}), though not the fitted part: do not use this model "
-            "before another log bears it out. The stage or the signal has changed, rings or drifts, or a "
+            "before another log confirms it. The stage or the signal has changed, rings or drifts, or a "
             "clock is off."
         )
     elif not odd:
@@ -197,19 +198,18 @@ def _drift(found: Identification) -> list[str]:
     least = DRIFT_WORTH_A_WORD * found.train.rms
     if abs(found.fit.drift) > least and not _is_small(found, found.fit.drift):
         return [
-            f"The displacement drifts by about {found.fit.drift:+.2g} µm over the fitted part: fitted beside "
-            "the model."
+            f"The displacement drifts by about {found.fit.drift:+.2g} µm over the fitted part. It is fitted "
+            "beside the model, as creep that slows down: a steady drift goes on faster after the fitted part."
         ]
     if abs(found.drift) > least and not _is_small(found, found.drift):
         return [f"The displacement drifts by about {found.drift:+.2g} µm over the record against the model."]
     return []
 
 
-def _along(found: Identification) -> list[str]:
-    said = _drift(found)
-    if found.held_out.rms > WORSE_ON_HELD_OUT * found.train.rms:
-        said.append(
-            f"The held-out error is {found.held_out.rms / found.train.rms:.1f} times the fitted one: "
-            "the stage or the signal changes along the record."
-        )
-    return said
+def _worse_later(found: Identification) -> list[str]:
+    if found.held_out.rms <= WORSE_ON_HELD_OUT * found.train.rms or _is_small(found, found.held_out.rms):
+        return []
+    return [
+        f"The held-out error is {found.held_out.rms / found.train.rms:.1f} times the fitted one: the stage "
+        "or the signal changes along the record."
+    ]

@@ -12,7 +12,7 @@ from piezoest.fitting.gaps import remembered
 from piezoest.fitting.runs import BoolArray
 from piezoest.fitting.surprise import noise_in
 from piezoest.identification.examined import FEWEST_SAMPLES, FEWEST_TURNS
-from piezoest.identification.sense import Finding
+from piezoest.identification.finding import Finding
 from piezoest.models import ColemanHodgdon, LinearGain
 from piezoest.records import Record
 from piezoest.records.source import counted
@@ -124,6 +124,7 @@ def check_excitation(data: Data, noise: float, found: Iterable[Finding]) -> None
         raise ValueError(
             said.get("falls")
             or said.get("unrelated")
+            or next((each.sentence for each in found if each.severity == "doubt"), "")
             or "the displacement falls as the voltage rises over the fitted part, not over the whole log: "
             "check what changed"
         )

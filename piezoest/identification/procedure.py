@@ -15,11 +15,12 @@ from piezoest.fitting.search import checked_delay
 from piezoest.identification.advice import advice_of, beyond_sentences, other_log_sentences
 from piezoest.identification.candidate import Candidate, best_of, reason_for
 from piezoest.identification.data import Data, check_enough, check_excitation, judged, noise_of, prepare
+from piezoest.identification.finding import Finding
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.repeats import noise_floor
 from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.result import Identification, Validation
-from piezoest.identification.sense import Finding, findings
+from piezoest.identification.sense import findings
 from piezoest.identification.steps_of_converter import levels
 from piezoest.models import LearntOn
 from piezoest.records import Record, as_record

@@ -15,9 +15,9 @@ from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
 from piezoest.identification.candidate import Candidate
 from piezoest.identification.data import judged
+from piezoest.identification.finding import Finding
 from piezoest.identification.interval import interval
 from piezoest.identification.residual import Misfit, Whiteness
-from piezoest.identification.sense import Finding
 from piezoest.identification.told import Kind, Row, figures_of, parameter_rows
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record

@@ -1,9 +1,6 @@
 """Whether a log makes sense, before a model is fitted to it: units, columns, loop and sensor."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import partial
-from typing import Literal
 
 import numpy as np
 
@@ -11,15 +8,19 @@ from piezoest._checks import FloatArray
 from piezoest.fitting.clipping import Top, flat_tops
 from piezoest.fitting.held import repeats
 from piezoest.fitting.runs import BoolArray
+from piezoest.fitting.surprise import noise_in
 from piezoest.identification.examined import FEWEST_SAMPLES, FEWEST_TURNS, Examined
 from piezoest.identification.feedback_in_log import answer
+from piezoest.identification.finding import Finding, doubt, note
 from piezoest.identification.steps_of_converter import levels
+from piezoest.identification.straight_line import SMALLEST_MOTION, straight
+from piezoest.identification.voltage_checks import flat_ends, joined
 from piezoest.records import Record
 from piezoest.records.source import counted
 
 MOST_MISSING = 0.1
 # What stages do: gain [µm/V] and stroke [µm]. Inputs of amplifiers, up to some 12 V, have greater gains.
-GAINS, STROKES = (1e-3, 30.0), (0.05, 2500.0)
+GAINS, STROKES = (1e-3, 30.0), (SMALLEST_MOTION, 2500.0)
 AMPLIFIER_INPUT, LARGEST_INPUT_GAIN = 13.0, 300.0
 LARGEST_VOLTAGE = 2000.0
 # Sample rates [Hz], and how long a swing there and back may take [s].
@@ -30,9 +31,6 @@ CALENDARS, TOO_FAST = ((3e4, 8e4), (7e5, 8e5)), 8e4
 CLOCKWISE, MOST_BRANCHES = 0.015, 0.8
 # ... and by which it is open wider than that of most stages: some have a quarter, with backlash more.
 WIDE = 0.35
-# Deviation from a straight line, relative to the stroke, that no piezo stage keeps to; a doubtful one.
-STRAIGHT, ALMOST_STRAIGHT = 1e-3, 1e-2
-UNITY = 5e-3
 # The voltage is clipped where the displacement goes on by this part of its range: more than a stage rings.
 GOES_ON = 0.08
 FEWEST_LEVELS, FEW_LEVELS = 30.0, 150.0
@@ -43,28 +41,6 @@ MANY_JUMPS, ALIKE = 8, 0.1
 DRIFT, LARGE_DRIFT = 0.05, 0.5
 # The displacement of a clipped voltage goes on by so many times its noise.
 ABOVE_NOISE = 8.0
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something that is odd about a log.
-
-    Parameters
-    ----------
-    name : str
-        Short, the same for all logs: ``"clockwise"``.
-    sentence : str
-        What was seen, with figures, and what to do.
-    severity : {"doubt", "note"}
-        Whether a model of this log is likely to be wrong, or only to be read with this in mind.
-    """
-
-    name: str
-    sentence: str
-    severity: Literal["doubt", "note"]
-
-
-doubt, note = partial(Finding, severity="doubt"), partial(Finding, severity="note")
 
 
 def findings(record: Record) -> tuple[Finding, ...]:
@@ -165,9 +141,9 @@ def _related(log: Examined) -> Iterator[Finding]:
     if not log.related:
         yield doubt(
             "unrelated",
-            "The displacement hardly follows the voltage: beside a straight line "
-            f"{100 * log.unexplained:.0f} % of its motion is left. Check that both columns are of one run "
-            "and one axis, that no rows are missing in one of them, and that no resonance is excited.",
+            "The displacement hardly follows the voltage: a straight line leaves "
+            f"{100 * log.unexplained:.0f} % of its motion unexplained. Check that both columns are of one "
+            "run and one axis, that no rows are missing in one of them, and that no resonance is excited.",
         )
 
 
@@ -234,22 +210,7 @@ def _closed_loop(log: Examined) -> Iterator[Finding]:
     # With a wrong sign, feedback cannot be told from what it is not.
     if not log.related or log.gain < 0.0:
         return
-    off = log.off / log.stroke
-    opening = abs(log.loop.opening)
-    if off < ALMOST_STRAIGHT and opening < ALMOST_STRAIGHT and abs(log.gain - 1.0) < UNITY:
-        yield doubt(
-            "reference",
-            f"The displacement is {log.gain:.4f} times the voltage, to {100 * off:.2g} % of the stroke: it "
-            "looks as if the reference in µm was logged in the place of the voltage; log what drives the "
-            "amplifier.",
-        )
-    elif off < STRAIGHT and opening < ALMOST_STRAIGHT and log.moved > STROKES[0]:
-        yield doubt(
-            "straight",
-            f"The displacement follows the voltage on a straight line to {100 * max(off, opening):.2g} % of "
-            "the stroke, where a piezo stage shows a loop: perhaps a closed loop tracks and its reference "
-            "was logged; log what drives the amplifier, with the servo off.",
-        )
+    yield from straight(log)
     feedback = answer(log.u, log.x, log.gain)
     if feedback.closed:
         how = (
@@ -266,7 +227,10 @@ def _closed_loop(log: Examined) -> Iterator[Finding]:
 
 
 def _limits(log: Examined) -> Iterator[Finding]:
+    noise = noise_in(np.diff(log.u, 3))
     for top in log.flaws.tops:
+        if top.beyond < ABOVE_NOISE * noise:
+            continue
         yield _clipped(
             "displacement", "µm", top, f"the voltage goes on by up to {top.beyond:.3g} V",
             "these stretches say nothing about the stage, identify leaves them out; reduce the voltage.",
@@ -297,14 +261,14 @@ def _resolution(log: Examined) -> Iterator[Finding]:
         say = doubt if count < FEWEST_LEVELS else note
         yield say(
             "coarse",
-            f"The displacement comes in steps of {step:.3g} µm, {count:.0f} over its range, and a loop is "
-            "some tenth of it: use a finer range of the converter, or save more digits.",
+            f"The displacement comes in steps of {step:.3g} µm, only {count:.0f} over its range, and a loop "
+            "is about a tenth of the range: use a finer range of the converter, or save more digits.",
         )
     elif (times := repeats(log.u[log.counts], log.record.displacement[log.counts])) > 1:
         yield note(
             "repeated",
             f"Each reading stands {times} times in a row: the sensor measures at {log.rate / times:.4g} Hz, "
-            f"keep one sample of {times}, as identify does.",
+            f"identify keeps one sample of {times}.",
         )
 
 
@@ -319,7 +283,7 @@ def _flaws(log: Examined) -> Iterator[Finding]:
         yield say(
             "spikes",
             f"{counted(count, 'sample')} of the displacement {'stands' if count == 1 else 'stand'} off "
-            f"alone, the first at {first(flaws.spikes)}: leave them out, as identify does.",
+            f"alone, the first at {first(flaws.spikes)}: identify leaves them out.",
         )
     if flaws.jumps.size:
         largest = int(np.argmax(np.abs(flaws.jump_sizes)))
@@ -327,14 +291,14 @@ def _flaws(log: Examined) -> Iterator[Finding]:
             "jumps",
             f"The displacement jumps {counted(flaws.jumps.size)} without the voltage, by "
             f"{flaws.jump_sizes[largest]:+.3g} µm at {float(log.record.time[flaws.jumps[largest]]):.6g} s: "
-            f"{_wraps(flaws.jump_sizes)}give each stretch an offset of its own, as identify does.",
+            f"{_wraps(flaws.jump_sizes)}identify gives each stretch an offset of its own.",
         )
     if flaws.dropouts.any():
         yield doubt(
             "dropouts",
             "The displacement stands still while the voltage moves, for "
             f"{int(np.sum(flaws.dropouts))} samples from {first(flaws.dropouts)} on: the sensor was lost, "
-            "leave them out, as identify does.",
+            "identify leaves them out.",
         )
     if count := int(np.sum(flaws.voltage)):
         say = doubt if count > MANY_SPIKES * log.x.size else note
@@ -342,7 +306,7 @@ def _flaws(log: Examined) -> Iterator[Finding]:
             "wrong voltage",
             f"{counted(count, 'sample')} of the voltage, the first at {first(flaws.voltage)}, "
             f"{'is' if count == 1 else 'are'} not what drove the stage (a spike, a zero, or a column that "
-            "stands still), for the displacement does not follow: leave them out, as identify does.",
+            "stands still), for the displacement does not follow: identify leaves them out.",
         )
     if len(flaws.rests):
         rested = int(np.sum(np.diff(flaws.rests, axis=1))) / log.rate
@@ -358,7 +322,7 @@ def _wraps(sizes: FloatArray) -> str:
     size = np.abs(sizes)
     if size.size < MANY_JUMPS or np.ptp(size) > ALIKE * np.mean(size):
         return ""
-    return "as all have one size, an interferometer or a counter may wrap: unwrap the column, or "
+    return "as all have one size, an interferometer or a counter may wrap: unwrap the column. "
 
 
 def _drift(log: Examined) -> Iterator[Finding]:
@@ -378,6 +342,6 @@ def _drift(log: Examined) -> Iterator[Finding]:
 
 
 CHECKS: tuple[Callable[[Examined], Iterator[Finding]], ...] = (
-    _timing, _excitation, _size, _direction, _closed_loop, _limits, _missing, _resolution, _flaws, _drift,
-    _related,
+    _timing, _excitation, _size, _direction, _closed_loop, _limits, flat_ends, joined, _missing, _resolution,
+    _flaws, _drift, _related,
 )  # fmt: skip

@@ -20,10 +20,11 @@ from piezoest.identification.candidate import left_out_error, simplest
 from piezoest.identification.data import check_enough, check_excitation, noise_of, prepare
 from piezoest.identification.drawing import Drawn
 from piezoest.identification.examined import FEWEST_SAMPLES
+from piezoest.identification.finding import Finding
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.parts import Part, Progress, parts, pieces
 from piezoest.identification.residual import Misfit
-from piezoest.identification.sense import Finding, findings
+from piezoest.identification.sense import findings
 from piezoest.identification.told import Kind, Row, figures_of, parameter_rows
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record, RecordStream

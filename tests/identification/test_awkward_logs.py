@@ -72,10 +72,26 @@ def closed_loop(same_row: bool) -> Log:
     return u, before if same_row else x, FS
 
 
-def followed(unit: float) -> Log:
-    """What a closed loop leaves where its reference is logged, in µm or in volts."""
+def followed(unit: float, late: float = 0.001) -> Log:
+    """What a closed loop leaves where its reference is logged, in µm or in volts, some seconds late."""
     r = 5.0 * np.sin(2.0 * np.pi * T) + 2.0 * np.sin(2.0 * np.pi * 0.7 * T)
-    return r / unit, np.interp(T - 0.001, T, r) + noise(deviation=2e-3), FS
+    return r / unit, np.interp(T - late, T, r) + noise(deviation=2e-3), FS
+
+
+def unipolar() -> Log:
+    """An amplifier that ends at -20 V, on a stage that creeps."""
+    driven = np.maximum(SINE, -20.0)
+    return (
+        SINE,
+        log(driven)[1]
+        + pz.Creep.logarithmic(0.03, shortest=0.01, longest=100.0).simulate(0.1 * driven, sample_rate=FS),
+        FS,
+    )
+
+
+def two_runs() -> Log:
+    u = np.concatenate([SINE[:3100], SINE[500 : N - 2600]])
+    return u, log(u)[1] + 0.3 * (np.arange(N) >= 3100), FS
 
 
 def in_steps_of(step: float) -> Callable[[], Log]:
@@ -108,6 +124,11 @@ FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "displacement early": (lambda: early(25), "clockwise", "time stamps"),
     "the reference in um": (lambda: followed(1.0), "reference", "reference in µm"),
     "the reference in volts": (lambda: followed(0.1), "straight", "servo off"),
+    "the reference in um, early": (lambda: followed(1.0, 0.0063), "reference", "6.3 samples earlier"),
+    "the reference in volts, early": (lambda: followed(0.1, 0.0063), "straight", "6.3 samples earlier"),
+    "two levels": (lambda: log(np.where(SINE > 0.0, 50.0, -50.0)), "two values", "slopes up and down"),
+    "an amplifier that ends at -20 V": (unipolar, "flat end", "Below about -24 V"),
+    "two runs": (two_runs, "voltage jumps", "two runs were joined"),
     "closed loop, reading after": (lambda: closed_loop(False), "closed loop", "later"),
     "closed loop, reading before": (lambda: closed_loop(True), "closed loop", "opposite ways"),
     "clipped above": (with_(lambda u, x: (u, x.clip(-9.0, 3.0))), "clipped displacement", "stands at 3 µm"),
@@ -138,7 +159,7 @@ FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "a long rest": (with_rest, "rests", "rests once"),
     "a strong drift": (with_(lambda u, x: (u, x + 0.4 * T)), "drift", "drifts by +3"),
 }
-NOTES = ("small stroke", "repeated", "rests", "drift")
+NOTES = ("small stroke", "repeated", "rests", "drift", "two values", "voltage jumps")
 NOTED = ("six bits", "some spikes", "voltage spike", "voltage of zero")
 
 

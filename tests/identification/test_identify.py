@@ -79,7 +79,7 @@ FLAWS: dict[str, tuple[Any, str]] = {
     "rest and jump": (lambda u, x: resting_first(u), "rests once"),
     "dropout": (lambda u, x: (u, np.where(abs(AT - 1000) < 30, x[970], x)), "stands still while"),
     "late jump": (lambda u, x: (u, x + 5.0 * (AT[::-1] < 400)), "jumps once"),
-    "spikes": (lambda u, x: (u, x + 20.0 * np.isin(AT, [300, 700])), "2 of the fitted samples are off"),
+    "spikes": (lambda u, x: (u, x + 20.0 * np.isin(AT, [300, 700])), "2 of the fitted samples are spikes"),
 }
 
 
