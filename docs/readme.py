@@ -35,12 +35,14 @@ start it is {cold} % for AdaptiveFeedforward. *Settled*: largest error in the la
 are the median over {seeds} seeds ({slow} for the slow estimators), then the geometric mean over the
 scenarios. *Step*: mean time of one sample, called from Python; for AdaptiveFeedforward one `step` and one
 `learn`. The stage of the paper is a sum of plays (elements with backlash), as is the model of
-PrandtlIshlinskiiRLS; real stages are not. Measured on {machine} on {date}{since}. A dash: {dash}
+PrandtlIshlinskiiRLS; one of the other stages is of the family of a model inside AdaptiveFeedforward. Real
+stages are neither. Measured on {machine} on {date}{since}. A dash: {dash}
 
-With a resonance, late readings or backlash the error on your rig is larger, and it takes longer to settle. On
-{rigs} simulated rigs drawn at random, half of them with a fault, the voltage never left its limits. On
-{share:.1f} % of them the error was at some time clearly larger than that of a straight line, and on
-{end:.1f} % at the end. See *Safety on unknown rigs* in the documentation.
+With a resonance, late readings or backlash the error on your rig is larger, and it takes longer to settle: of
+{cells} combinations of stage, amplitude and frequency, with a resonance, {soon} settle within {periods:g}
+periods after a cold start. On {rigs} simulated rigs drawn at random, half of them with a fault, the voltage
+never left its limits. On {share:.1f} % of them the error was at some time clearly larger than that of a
+straight line, and on {end:.1f} % at the end. See *Safety on unknown rigs* in the documentation.
 
 The paper measured a largest error of {linear_theirs:g} µm with linear feed-forward and {theirs:g} µm with
 compensation. The same procedure gives {linear_ours:.2g} µm and {ours:.2g} µm on the simulated stage. On a
@@ -52,7 +54,8 @@ recording of a real stage that moves by {stroke:.0f} µm, the error of the ident
 def figures() -> str:
     """Tables and sentences between the marks."""
     runs, paper, recording = read("table"), read("paper"), read("real_data")
-    rigs = read("safety")["controller"]["all"]
+    safety = read("safety")
+    rigs, cells = safety["controller"]["all"], safety["map"]["cells"]
     found = recording["identify"]
     row = {
         entry["quantity"]: entry for entry in paper["tables"] if (entry["table"], entry["row"]) == ("II", ROW)
@@ -69,6 +72,9 @@ def figures() -> str:
         "date": runs["date"][:10],
         "since": since(runs),
         "rigs": rigs["runs"],
+        "cells": cells["asked"],
+        "soon": cells["kept"]["cold-start"],
+        "periods": safety["criteria"]["soon"],
         "share": 100.0 * rigs["violations"]["ratio"] / rigs["runs"],
         "end": 100.0 * rigs["violations"]["last_ratio"] / rigs["runs"],
         "linear_theirs": linear["value"],

@@ -147,9 +147,10 @@ def main(open_driver: Callable[[], Any]) -> int:
         print(f"time per sample: median {np.median(busy):.0f} µs, longest {busy.max():.0f} µs")
         off = np.abs(run.record["reference"] - run.record["displacement"])[: run.done]
         period = int(reference.period)
-        for name, part in (("first", off[:period]), ("last", off[-period:])):
-            read = part[np.isfinite(part)]
-            print(f"largest error in the {name} period: {read.max():.3f} µm" if read.size else "no reading")
+        parts = np.split(off, range(period, off.size, period))
+        largest = (np.max(part[np.isfinite(part)], initial=-1.0) for part in parts)
+        said = (f"{error:.3f}" if error >= 0.0 else "no reading" for error in largest)
+        print("largest error of each period [µm]:", *said)
     print(controller.status, *controller.events, sep="\n")
     return 0 if failure is None else 1
 

@@ -3,12 +3,13 @@
 import bz2
 import lzma
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from piezoest.records import read_record
+from piezoest.records import Record, read_record
 from tests.logs import ROWS
 
 T, U, X = np.transpose(ROWS)
@@ -149,3 +150,16 @@ def test_arrays_of_simulink_and_julia(tmp_path: Path) -> None:
     with h5py.File(path, "w", userblock_size=512) as file:
         file["time"], file["voltage"], file["displacement"] = t, u.reshape(1, 1, -1), x.reshape(-1, 1, 1)
     assert np.allclose(read_record(path).displacement, x)
+
+
+def test_a_record_shows_what_it_holds_and_arrays_are_no_files() -> None:
+    record = Record.from_arrays([0.0, 1.0, 2.0], [np.nan] * 3, 1000.0)
+    assert repr(record).startswith(
+        "Record(3 samples at 1000 Hz, 0 to 2 V, no µm, source='record', skipped=3, "
+    )
+    assert record == record
+    assert len({record, replace(record)}) == 2
+    with pytest.raises(ValueError, match=r"got ndarray: use Record\.from_arrays"):
+        read_record(np.zeros(5))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="voltage needs at least 2"):
+        Record.from_arrays([], [], 1000.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from piezoest.signals import Signal
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Record:
     """A recorded log: voltage in, displacement out, evenly sampled.
 
@@ -48,12 +48,12 @@ class Record:
     --------
     >>> import piezoest as pz
     >>> pz.Record.from_arrays([0.0, 1.0, 2.0], [0.0, 0.13, 0.27], sample_rate=1000.0)
-    Record(sample_rate=1000.0, source='record', skipped=0, notes=())
+    Record(3 samples at 1000 Hz, 0 to 2 V, 0 to 0.27 µm, source='record', skipped=0)
     """
 
-    time: FloatArray = field(repr=False)
-    voltage: FloatArray = field(repr=False)
-    displacement: FloatArray = field(repr=False)
+    time: FloatArray
+    voltage: FloatArray
+    displacement: FloatArray
     sample_rate: float
     source: str = "record"
     skipped: int = 0
@@ -69,6 +69,15 @@ class Record:
                     f"{name} must be as long as the {other}, {self.time.size} samples, got {values.size}"
                 )
         object.__setattr__(self, "sample_rate", positive("sample_rate", self.sample_rate))
+
+    def __repr__(self) -> str:
+        """How long it is, its ranges, and what was noted."""
+        said = [f"Record({len(self)} samples at {self.sample_rate:.6g} Hz"]
+        for values, unit in ((self.voltage, "V"), (self.displacement, "µm")):
+            read = values[np.isfinite(values)]
+            said.append(f"{read.min():.4g} to {read.max():.4g} {unit}" if read.size else f"no {unit}")
+        noted = [f"notes={self.notes!r}"] if self.notes else []
+        return ", ".join([*said, f"source={self.source!r}", f"skipped={self.skipped}", *noted]) + ")"
 
     @classmethod
     def from_arrays(
@@ -90,7 +99,7 @@ class Record:
         ValueError
             If the arrays are not of one shape (N,), or the sample rate is not above zero.
         """
-        voltage = array_1d("voltage", voltage, allow_nan=True)
+        voltage = array_1d("voltage", voltage, allow_nan=True, minimum_length=2)
         time = np.arange(voltage.size) / positive("sample_rate", sample_rate)
         return cls(time, voltage, displacement, sample_rate, source)._counted()
 

@@ -1,5 +1,6 @@
 """A recorded log of any format and any length, block by block."""
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -88,6 +89,11 @@ class RecordStream:
         named = {quantity: str(name) for quantity, name in _mapping("columns", columns).items()}
         units = _mapping("units", units)
         self._rows = integer("rows", rows, 1)
+        if not isinstance(path, str | os.PathLike | Source):
+            raise ValueError(
+                f"path must be that of a file, got {type(path).__name__}: use Record.from_arrays, or "
+                "Record.from_frame for a table"
+            )
         self._source = source = path if isinstance(path, Source) else open_source(Path(path))
         notes = []
         if sample_rate is None and "time" not in named and states_its_rate(source):
