@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from piezoest.records import Record, read_record
-from tests.logs import ROWS
+from tests.logs import ROWS, write_sheets
 
 T, U, X = np.transpose(ROWS)
 LINES = [f"{t:.4f},{u},{x}" for t, u, x in ROWS]
@@ -98,6 +98,24 @@ def test_headers_of_several_lines(tmp_path: Path, lines: list[str]) -> None:
 def test_means_and_empty_cells_below_are_no_rows(tmp_path: Path, below: list[str]) -> None:
     record = read_record(written(tmp_path, ["time_s,voltage_V,x_um", *LINES, *below]))
     assert len(record) == len(ROWS)
+
+
+def test_means_below_a_sheet_and_a_column_of_remarks(tmp_path: Path) -> None:
+    header = ("time_s", "voltage_V", "x_um")
+    below = write_sheets(tmp_path / "means.xlsx", Log=[header, *ROWS, (None, 50.0, 6.0)])
+    record = read_record(below)
+    assert len(record) == len(ROWS)
+    assert f"row {len(ROWS) + 2} has no first cell" in record.notes[0]
+    remarks = ((["start"] if k == 0 else [None]) + [*row] for k, row in enumerate(ROWS))
+    path = write_sheets(tmp_path / "remarks.xlsx", Log=[("remark", *header), *remarks])
+    assert len(read_record(path)) == len(ROWS)
+
+
+@pytest.mark.parametrize(
+    "header", ["Time (s),Dev1/ai0 (V),Dev1/ai1 (um)", "t_s,u_V,Axis 1 x (um)", "t_s,CH2_V,x_um"]
+)
+def test_names_of_channels_are_no_factors(tmp_path: Path, header: str) -> None:
+    assert np.allclose(read_record(written(tmp_path, [header, *LINES])).displacement, X)
 
 
 def test_units_behind_the_numbers(tmp_path: Path) -> None:

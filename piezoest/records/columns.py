@@ -76,10 +76,8 @@ def choose(
                 )
             index = i + more
         title = source.titles[index] if source.titles else str(index + 1)
-        taken = (
-            (1.0, "") if not source.titles and not named and not _stated_beside(source, quantity) else None
-        )
-        factor = stated.get(quantity) or taken or _factor(source, title, quantity)
+        plain = not source.titles and not named and not _stated_beside(source, quantity)
+        factor = stated.get(quantity) or ((1.0, "") if plain else _factor(source, title, quantity))
         if quantity in stated and (unit := split_unit(title)[1]) and unit not in UNITS[quantity]:
             # Of 1 V and 1 mV one may be meant where the other is written.
             said = f"column {title!r}: 1 in it is taken as {factor[0]:g} {BASE_UNITS[quantity]}"

@@ -5,13 +5,7 @@ import re
 
 from piezoest.records.cells import OF_SHEETS, ONE_GROUP, Style, number
 from piezoest.records.rates import is_decimated, rate_of, stated_rate
-from piezoest.records.titles import (
-    quantities_called,
-    quantity_of_unit,
-    split_unit,
-    with_u,
-    with_units,
-)
+from piezoest.records.titles import quantities_called, quantity_of_unit, split_unit, with_u, with_units
 
 COMMENTS = ("#", "%")
 # The beginning of a comment, but not of a row whose first cell is an error of a spreadsheet.

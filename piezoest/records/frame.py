@@ -14,16 +14,8 @@ from piezoest._checks import FloatArray
 from piezoest.records.beside import units_beside
 from piezoest.records.cells import Style, is_missing
 from piezoest.records.comments import entries_in, rate_in, with_stated_units
-from piezoest.records.source import (
-    EXTRA,
-    LogError,
-    Rows,
-    Source,
-    check_size,
-    damaged,
-    floats,
-    shown,
-)
+from piezoest.records.lines import LONGEST_MEANS
+from piezoest.records.source import EXTRA, LogError, Rows, Source, check_size, damaged, floats, shown
 from piezoest.records.titles import NAMES, split_unit, titled, with_units
 
 TIMES = datetime.date | datetime.time | datetime.timedelta
@@ -154,8 +146,11 @@ def open_sheet(path: Path) -> Frame:
         # A sample of which only one cell is not missing.
         begins -= 1
     table = sheet.iloc[begins:].dropna(axis=1, how="all")
-    # A line below the rows, such as of means, has no time.
-    table = table.loc[: table.iloc[:, 0].last_valid_index()]
+    table = table.loc[: table.last_valid_index()]
+    empty = np.flatnonzero(table.iloc[:, 0].isna())
+    means = 0 < empty.size <= LONGEST_MEANS and empty[0] == len(table) - empty.size > 0
+    # Lines below the rows, such as of means, have no time.
+    table = table.iloc[: empty[0]] if means else table
     above = sheet.iloc[:begins][table.columns].dropna(how="all")
     lines = [[str(name).strip() for name in line] for line in above.fillna("").to_numpy()]
     names = lines[-1] if lines else []
@@ -172,6 +167,8 @@ def open_sheet(path: Path) -> Frame:
     found = Frame(
         path, series, header, header, begins + 1, "a spreadsheet is read as a whole: save the log as CSV"
     )
+    if means:
+        found.note(f"row {begins + 1 + len(table)} has no first cell: the log is taken to end before it")
     found.note_factors(map(" ".join, said))
     found.stated_units, found.sample_rate = units, rate_in(entries_in(said), Style())
     if len(sheets) > 1:

@@ -6,15 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest import _extras
-from piezoest.records.beside import (
-    MOST_WORDS,
-    NAMES,
-    UNITS,
-    stated,
-    texts_of,
-    unit_of,
-    words_of,
-)
+from piezoest.records.beside import MOST_WORDS, NAMES, UNITS, stated, texts_of, unit_of, words_of
 from piezoest.records.rates import DECIMATED, PERIODS, RATES
 from piezoest.records.source import EXTRA, LogError, check_size, damaged, finite, shown
 from piezoest.records.table import Named, Table, columns_of

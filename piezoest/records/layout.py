@@ -111,20 +111,9 @@ def layout_of(path: Path) -> Layout:
     begins = rows[0][0]
     rate = rate_in([*above, *entries_in(preamble), *scopes.entries(preamble)], style)
     return Layout(
-        path,
-        encoding,
-        delimiter,
-        header,
-        width,
-        begins,
-        skip_blank,
-        style,
-        stamps,
-        rate,
-        units,
-        said,
+        path, encoding, delimiter, header, width, begins, skip_blank, style, stamps, rate, units, said,
         cell_units,
-    )
+    )  # fmt: skip
 
 
 def _delimiter(line: str) -> str:

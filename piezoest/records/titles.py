@@ -68,22 +68,11 @@ OTHERS = {
 # words that say that it was measured, or is the amplifier's output.
 PLAIN = {
     "voltage": (
-        "voltage",
-        "u",
-        "v",
-        "volt",
-        "volts",
-        "vin",
-        "input",
-        "control voltage",
-        "command voltage",
-        "drive",
-        "drive voltage",
-        "output voltage",
-        "spannung",
+        "voltage", "u", "v", "volt", "volts", "vin", "input", "control voltage", "command voltage", "drive",
+        "drive voltage", "output voltage", "spannung",
     ),
     "displacement": ("displacement", "x", "y", "w", "disp", "position", "pos"),
-}
+}  # fmt: skip
 MEASURED = {
     "voltage": (
         "piezo", "hv", "high", "amplifier", "amp", "amplified", "out", "output", "monitor", "mon", "meas",
@@ -94,9 +83,9 @@ MEASURED = {
         "encoder", "gauge", "laser", "interferometer", "vibrometer", "capacitive",
     ),
 }  # fmt: skip
-# ``voltage/10``, ``monitor x10``, ``position*1e6``.
+# ``voltage/10``, ``monitor x10``, ``position*1e6``, ``1:20``; but not ``Dev1/ai0``.
 FACTOR = re.compile(
-    r"\S\s*[/*×÷]\s*[-+]?\d|\d\s*[*×÷:/]\s*[\d(\[]*\w|[\W_]x\s*\d{2,}|\d\s*x\s|\^|\b(?:log|sqrt|exp)\b",
+    r"\S\s*[*×÷]\s*[-+]?\d|\S\s*/\s*\d\d|\d\s*[:/]\s*\d|\d\s*[*×]\s*\w|^\d+\s*x\s|[\W_]x\s*\d\d|\^|\b(?:log|sqrt)\b",
     re.IGNORECASE,
 )
 # ``amplifier gain: 20 V/V``, ``sensitivity 10 µm/V``, ``monitor 1:20``.
