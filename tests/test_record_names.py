@@ -156,9 +156,20 @@ def test_packed_texts(tmp_path: Path, pack: Callable[[bytes], bytes]) -> None:
     path = tmp_path / "log.csv.packed"
     path.write_bytes(pack("\n".join(["time_s,voltage_V,x_um", *LINES]).encode()))
     assert len(read_record(path)) == len(ROWS)
-    path.write_bytes(pack(b"time_s,voltage_V,x_um\n" + b"0,1,2\n" * 999)[:-20])
-    with pytest.raises(ValueError, match="cannot be unpacked"):
-        read_record(path)
+    whole = pack(b"time_s,voltage_V,x_um\n" + b"0,1,2\n" * 999)
+    for damaged in (whole[:-20], whole[:30] + bytes(20) + whole[50:]):
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match="cannot be unpacked"):
+            read_record(path)
+
+
+def test_comments_of_blanks_between_rows(tmp_path: Path) -> None:
+    rows = [line.replace(",", " ") for line in LINES]
+    record = read_record(
+        written(tmp_path, ["time_s voltage_V x_um", *rows[:50], "#   ", "#", "# 1 2", *rows[50:]])
+    )
+    assert len(record) == len(ROWS)
+    assert any("'# 1 2' stands between rows" in each for each in record.notes)
 
 
 def test_arrays_of_simulink_and_julia(tmp_path: Path) -> None:

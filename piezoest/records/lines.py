@@ -82,7 +82,9 @@ def unpacked(path: Path) -> Iterator[tuple[BinaryIO, BinaryIO]]:
         raw.seek(0)
         try:
             yield raw, raw if unpack is None else unpack(raw)
-        except (gzip.BadGzipFile, EOFError, zlib.error, lzma.LZMAError) as error:
+        except (OSError, EOFError, zlib.error, lzma.LZMAError) as error:
+            if unpack is None:
+                raise
             raise LogError(f"{path}: cannot be unpacked, it may be truncated: {error}") from None
 
 

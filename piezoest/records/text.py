@@ -52,7 +52,8 @@ class Text(Source):
         )
 
     def _skipped(self, place: int, line: str) -> None:
-        row = is_row(bare(line) or "-", self.layout.delimiter) and not self._commented
+        text = bare(line).strip()
+        row = not self._commented and text != "" and is_row(text, self.layout.delimiter)
         self._commented |= row
         if row or states_units(line):
             self.note(f"line {place}: {shown(line)!r} stands between rows, and is skipped")
