@@ -25,8 +25,8 @@ OF_RATES = {
 OF_PERIODS = {"": 1.0, **UNITS["time"]}
 # A file that keeps one sample of several states a rate that may be that of all of them.
 DECIMATED = re.compile(
-    r"(?:decimat|\bdec\b|down_?sampl|sub_?-?sampl|untersetz|record_table_rate|\bevery|reduction|divider|\bskip|"
-    r"\bavg|averag|binn)\D*(\d+)",
+    r"(?:decimat|\bdec\b|down_?sampl|sub_?-?sampl|untersetz|record_table_rate|\bevery|reduction|divider|"
+    r"\bskip|\bavg|averag|binn)\D*(\d+)",
     re.IGNORECASE,
 )
 

@@ -85,12 +85,14 @@ MEASURED = {
 }  # fmt: skip
 # ``voltage/10``, ``monitor x10``, ``position*1e6``, ``1:20``; but not ``Dev1/ai0``.
 FACTOR = re.compile(
-    r"\S\s*[*×÷]\s*[-+]?\d|\S\s*/\s*\d\d|\d\s*[:/]\s*\d|\d\s*[*×]\s*\w|^\d+\s*x\s|[\W_]x\s*\d\d|\^|\b(?:log|sqrt)\b",
+    r"\S\s*[*×÷]\s*[-+]?\d|\S\s*/\s*\d\d|\d\s*[:/]\s*\d|\d\s*[*×]\s*\w|^\d+\s*x\s|"
+    r"[\W_]x\s*\d\d|\^|\b(?:log|sqrt)\b",
     re.IGNORECASE,
 )
 # ``amplifier gain: 20 V/V``, ``sensitivity 10 µm/V``, ``monitor 1:20``.
 STATED_FACTOR = re.compile(
-    r"(?:gain|amplif|verst[äa]rk|sensitivity|empfindlich|monitor|scal(?:e|ing)|factor|faktor)\D{0,40}?([\d.]+)|"
+    r"(?:gain|amplif|verst[äa]rk|sensitivity|empfindlich|monitor|scal(?:e|ing)|factor|faktor)"
+    r"\D{0,40}?([\d.]+)|"
     r"([\d.]+)\s*(?:[unpm]?m|m?V)\s*/\s*m?V\b",
     re.IGNORECASE,
 )
