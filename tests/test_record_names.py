@@ -70,6 +70,13 @@ def test_what_may_be_scaled_or_another_one_is_said(tmp_path: Path, lines: list[s
     assert np.allclose(record.voltage, U)
 
 
+def test_notes_on_one_column_are_one_sentence(tmp_path: Path) -> None:
+    path = written(tmp_path, ["t_s,u_V,x,z_um", *(f"{line},7.0" for line in NM)])
+    notes = read_record(path, units={"displacement": "nm"}).notes
+    said = "column 'x': taken as the displacement, and not z_um, displacement: converted to µm (factor 0.001)"
+    assert said in notes
+
+
 @pytest.mark.parametrize(
     "lines",
     [

@@ -23,7 +23,6 @@ EPILOG = examples(
     "piezoest compensate r.csv --alpha 0.017 --beta 0.148 --gamma 0.0038 -o u.csv",
 )
 
-# Where the voltage is bounded by each limit.
 # The first step from rest is a jump if it is so many times the largest that follows.
 JUMP = 3.0
 # ... and more than this fraction of the whole swing.

@@ -7,8 +7,8 @@ import numpy as np
 from piezoest.identification.examined import Examined
 from piezoest.identification.finding import Finding, doubt, note
 
-# The range of the voltage is looked at in so many parts. At an end of it, this share of the parts has less
-# than this part of the usual slope where an amplifier, a sensor or a stop ends the motion.
+# The range of the voltage is looked at in so many parts. Where an amplifier, a sensor or a stop ends the
+# motion, so many parts at an end of it have less than this fraction of the usual slope.
 PARTS, LEAST_FLAT, FLAT = 20, 2, 0.2
 # The voltage must go over a part so often that noise hardly counts.
 WAYS = 2.0

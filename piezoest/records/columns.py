@@ -175,8 +175,8 @@ def _others(source: Source, quantity: str, index: int) -> str:
 
 def _also(factor: tuple[float, str], title: str, said: str) -> tuple[float, str]:
     """A factor whose note says something else first."""
-    first = f"column {title!r}:"
-    return factor[0], f"{first} {said}{factor[1].replace(first, ',') if factor[1] else ''}"
+    rest = factor[1].removeprefix(f"column {title!r}: ")
+    return factor[0], f"column {title!r}: {said}{', ' + rest if rest else ''}"
 
 
 def _listed(source: Source) -> str:

@@ -96,6 +96,8 @@ STATED_FACTOR = re.compile(
     r"([\d.]+)\s*(?:[unpm]?m|m?V)\s*/\s*m?V\b",
     re.IGNORECASE,
 )
+# Before a capital a word begins: ``ActualPos``.
+CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 # What columns without names are.
 UNNAMED = ("time", "voltage", "displacement")
 # What stands in brackets behind a name; it is the number of an axis or a channel, no unit: 1, AO0, axis 2.
@@ -129,7 +131,7 @@ def may_state_a_unit(title: str) -> bool:
     named = behind is None or CHANNEL.fullmatch(behind[1]) or quantities_called(behind[1])
     if re.search("[%°]", plain) or not named:
         return True
-    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain).lower().replace("_", " ")
+    words = CAPITAL.sub(" ", plain).lower().replace("_", " ")
     return any(word in SCALES and not quantities_called(word) for word in re.findall(r"[^\W\d]+", words))
 
 
@@ -213,7 +215,7 @@ def states_factor(line: str) -> bool:
 
 def words_of(name: str) -> list[str]:
     """Words of a name in lower case: ``ActualPos`` has two."""
-    return re.findall(r"[^\W_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
+    return re.findall(r"[^\W_]+", CAPITAL.sub(" ", name).lower())
 
 
 def is_named(title: str, quantity: str) -> bool:
