@@ -188,7 +188,7 @@ def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: 
     if array.ndim != 1:
         hint = f"pass one column, as {name}[:, 0]"
         if array.ndim == 0:
-            hint = "use step() for single samples, or pass an array"
+            hint = "pass all samples as one array"
         elif array.size == max(array.shape):
             hint = f"pass {name}.ravel()"
         raise ValueError(f"{name} must have shape (N,), got {array.shape}: {hint}")

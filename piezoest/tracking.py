@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MOST_COLUMNS = 3
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TrackingRecord:
     """Record of a control loop, one number per sample.
 

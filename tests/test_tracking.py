@@ -22,6 +22,8 @@ def test_plain_arrays_need_a_rate() -> None:
     record = pz.track(WAVE, stage=wire, **UNITY, sample_rate=100.0)
     np.testing.assert_allclose(record.error, 0.0, atol=1e-12)
     assert (record.time[1], record.theta.shape) == (0.01, (100, 0))
+    assert record == record
+    assert record != pz.track(WAVE, stage=wire, **UNITY, sample_rate=100.0)
     with pytest.raises(ValueError, match="has no period"):
         record.max_error(last_periods=1)
     record = pz.track(pz.signals.sine(1.0, 5.0, 2, 100.0), stage=wire, **UNITY)

@@ -46,12 +46,11 @@ class VoltageLimits:
         # Not >=: a limit that is NaN must be refused too.
         if not self.minimum < self.maximum:
             raise ValueError(f"minimum must be below maximum, got {self.minimum:g} V and {self.maximum:g} V")
-        if self.slew_rate is not None:
-            positive("slew_rate", self.slew_rate)
-            if self.sample_rate is None:
-                raise ValueError("slew_rate needs sample_rate: pass the rate of the loop in Hz")
-        if self.sample_rate is not None:
-            positive("sample_rate", self.sample_rate)
+        for name in ("slew_rate", "sample_rate"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, positive(name, getattr(self, name)))
+        if self.slew_rate is not None and self.sample_rate is None:
+            raise ValueError("slew_rate needs sample_rate: pass the rate of the loop in Hz")
 
     @property
     def largest_step(self) -> float:

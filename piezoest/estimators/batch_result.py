@@ -6,7 +6,7 @@ from piezoest.fitting.outcome import Outcome
 from piezoest.models import Creep, FreeRunning
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class BatchFitResult(Outcome):
     """Outcome of an output-error fit.
 

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from piezoest._checks import FloatArray, moderate
+from piezoest._checks import FloatArray, moderate, non_negative
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import ekf_kernel
 from piezoest.estimators.compiled import CompiledEstimator
@@ -133,7 +133,7 @@ class HysteresisEKF(CompiledEstimator):
                 "drift": drift,
                 "mismatch": mismatch,
                 "offset": bool(offset),
-                "delay": float(delay),
+                "delay": non_negative("delay", delay),
                 "project": bool(project),
             },
             ekf_kernel.state_layout(

@@ -76,7 +76,7 @@ class Status:
     outliers: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Trace:
     """History of an estimator over a `run`, every k-th sample.
 

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, instance, integer, moderate
+from piezoest._checks import FloatArray, array_1d, instance, integer, moderate, non_negative
 from piezoest.estimators import play_grid
 from piezoest.estimators import play_rls_kernel as kernel
 from piezoest.estimators.compiled import Freezable
@@ -161,7 +161,7 @@ class PrandtlIshlinskiiRLS(Freezable):
                 "creep": np.asarray(creep, dtype=np.float64).tolist(),
                 "uncertainty": float(uncertainty),
                 "noise": float(noise),
-                "delay": float(delay),
+                "delay": non_negative("delay", delay),
                 "mechanics": None if mechanics is None else mechanics.to_dict(),
             },
             kernel.layout(plan, line, ABSENT if mechanics is None else kernel.RESONANCE),

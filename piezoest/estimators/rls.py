@@ -4,7 +4,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from piezoest._checks import FloatArray, moderate
+from piezoest._checks import FloatArray, moderate, non_negative
 from piezoest.equations import admissible
 from piezoest.estimators import derivative_form as form
 from piezoest.estimators import recursive_least_squares_kernel as law
@@ -155,7 +155,7 @@ class HysteresisRLS(Freezable):
             "cutoff": cutoff,
             "high_pass": None if high_pass is None else float(moderate("high_pass", high_pass)),
             "offset": bool(offset),
-            "delay": float(delay),
+            "delay": non_negative("delay", delay),
             "time_base": time_base,
             "errors": bool(errors),
         }

@@ -75,7 +75,8 @@ class Code(Written):
 @app.command(
     epilog=examples(
         "piezoest export c model.json -o firmware --minimum 0 --maximum 150",
-        "piezoest export c model.json -o firmware --estimator rls --sample-rate 5e4 --minimum 0 --maximum 99",
+        "piezoest export c model.json -o firmware --estimator rls --sample-rate 50000 "
+        "--minimum 0 --maximum 150",
     )
 )
 @grouped
@@ -138,7 +139,8 @@ def adaptive(
 
 @app.command(
     epilog=examples(
-        "piezoest export fmu stage.json -o a.fmu --estimator rls --sample-rate 5e4 --minimum 0 --maximum 150"
+        "piezoest export fmu model.json -o stage.fmu --estimator rls --sample-rate 50000 "
+        "--minimum 0 --maximum 150"
     )
 )
 @grouped
@@ -201,14 +203,22 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any], float]:
             raise ValueError(f"{path}: its estimator is not what to_dict() gave: {error}") from None
     if estimator is not None and described is data:
         return estimator.model, estimator, limits, 0.0
-    known = data.get("delay_known", True) and data.get("sample_rate_Hz")
-    delay = float(data.get("delay_samples") or 0.0) / float(known) if known else 0.0
     if "model" not in described:
         raise ValueError(f"{path} names no model: expected the JSON that identify --output wrote")
     try:
-        return model_from_dict(described), estimator, limits, delay
+        return model_from_dict(described), estimator, limits, _delay(data)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+
+
+def _delay(data: dict[str, Any]) -> float:
+    """The delay that identify measured [s]; zero if the log could not tell it."""
+    if not (data.get("delay_known", True) and data.get("sample_rate_Hz") and data.get("delay_samples")):
+        return 0.0
+    from piezoest._checks import non_negative, positive
+
+    samples = non_negative("delay_samples", data["delay_samples"])
+    return samples / positive("sample_rate_Hz", data["sample_rate_Hz"])
 
 
 def _warn(pair: tuple[Any, Any]) -> None:
@@ -222,21 +232,19 @@ def _pair(path: Path, stated: Stated) -> tuple[Any, Any]:
     import piezoest as pz
 
     model, estimator, limits, delay = _read(path)
-    if stated.estimator is not None:
-        kinds: dict[str, Any] = {"none": None, "rls": pz.HysteresisRLS, "ekf": pz.HysteresisEKF}
-        kind = kinds[stated.estimator]
-        if kind is not None and stated.sample_rate is None:
+    if stated.estimator == "none":
+        estimator = None
+    elif stated.estimator is not None:
+        if stated.sample_rate is None:
             raise ValueError("an estimator needs --sample-rate")
-        if kind is not None and not isinstance(model, pz.ColemanHodgdon | pz.LinearGain):
+        if not isinstance(model, pz.ColemanHodgdon | pz.LinearGain):
             raise ValueError(
                 f"--estimator {stated.estimator} needs a ColemanHodgdon or a LinearGain, {path} holds a "
                 f"{type(model).__name__}: run identify with --model coleman-hodgdon, or leave --estimator out"
             )
-        if kind is not None and stated.sample_rate is not None:
-            # Without the delay that identify measured, the estimator would take it for hysteresis.
-            estimator = kind(stated.sample_rate, initial_model=model, delay=delay * stated.sample_rate)
-        else:
-            estimator = None
+        kind: Any = {"rls": pz.HysteresisRLS, "ekf": pz.HysteresisEKF}[stated.estimator]
+        # Without the delay that identify measured, the estimator would take it for hysteresis.
+        estimator = kind(stated.sample_rate, initial_model=model, delay=delay * stated.sample_rate)
     rate = stated.sample_rate or getattr(estimator, "sample_rate", None)
     own = {"minimum": stated.minimum, "maximum": stated.maximum, "slew_rate": stated.slew_rate}
     limits |= {name: value for name, value in {**own, "sample_rate": rate}.items() if value is not None}

@@ -21,7 +21,7 @@ UNKNOWN = 1e6
 BLOCKS = 25
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
     """What a solution says of the parameters.
 

@@ -26,7 +26,7 @@ class Prediction(NamedTuple):
         return f"<Prediction of {self.x.size} samples, within {np.max(self.upper - self.lower) / 2.0:.3g} µm>"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A model fitted to a record.
 

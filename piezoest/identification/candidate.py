@@ -27,7 +27,7 @@ def left_out_error(fitted: Fit | Fitted) -> float:
     return float(np.sqrt(fitted.held_out * fitted.ahead))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
     """One kind of model, fitted and judged.
 

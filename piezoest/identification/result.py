@@ -53,7 +53,7 @@ class Validation(NamedTuple):
         }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Identification:
     """A model identified from a record, and its accuracy.
 

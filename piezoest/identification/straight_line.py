@@ -33,6 +33,11 @@ class Line(NamedTuple):
 
 def straight(log: Examined) -> Iterator[Finding]:
     """Say where there is no loop."""
+    if np.unique(log.u).size <= 2:
+        yield note(
+            "two values", "The voltage takes only two values: no loop can show; record slopes up and down."
+        )
+        return
     off, opening, gain, lag = log.off / log.stroke, abs(log.loop.opening), log.gain, 0.0
     at_once = opening < ALMOST_STRAIGHT
     reference = at_once and off < ALMOST_STRAIGHT and abs(gain - 1.0) < UNITY
@@ -45,11 +50,7 @@ def straight(log: Examined) -> Iterator[Finding]:
         reference = off < LATE_ALMOST and abs(gain - 1.0) < LATE_UNITY
         plain = told and off < LATE_STRAIGHT and lag >= LEAST_LAG
     behind = f" {lag:.3g} samples earlier" if lag else ""
-    if np.unique(log.u).size <= 2:
-        yield note(
-            "two values", "The voltage takes only two values: no loop can show; record slopes up and down."
-        )
-    elif reference:
+    if reference:
         yield doubt(
             "reference",
             f"The displacement is {gain:.4f} times the voltage{behind}, to {100 * off:.2g} % of the stroke: "

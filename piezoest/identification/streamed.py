@@ -34,7 +34,7 @@ from piezoest.records.source import counted
 MOST_POINTS = 20_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class StreamedIdentification:
     """A model identified block by block from a log of any length.
 

@@ -137,6 +137,13 @@ def test_the_readings_at_rest_need_not_be_waited_for(gain: float | None) -> None
     assert driver.to_dict() == controller(gain=gain).to_dict()
 
 
+def test_limits_may_be_any_numbers() -> None:
+    given: Any = (np.int64(-20), np.float32(120.0), np.int64(5000), np.int32(FS))
+    limits = pz.VoltageLimits(*given)
+    driver = pz.AdaptiveFeedforward(FS, limits=limits, estimators=())
+    assert shared.read_back(driver).to_dict() == driver.to_dict()
+
+
 def test_where_it_stands_may_be_wrong() -> None:
     driver = controller()
     driver.reset(displacement=3.0)

@@ -20,6 +20,7 @@ OPTIONS: dict[Any, list[tuple[dict[str, Any], str]]] = {
         ({"memory": -1.0}, "memory must be above zero"), ({"noise": 1e200}, "noise"),
         ({"memory": "foo"}, "memory must be .period., a number of seconds or None, got 'foo'"),
         ({"offset": "x"}, "offset must be True, False or None"), ({"delay": 1e9}, "delay must be at most"),
+        ({"delay": "3"}, "delay must be one number, got '3'"),
         ({"time_base": "seconds"}, "time_base must be"), ({"policies": 3}, "policies must be a tuple"),
         ({"policies": (p.NormBound(), p.NormBound())}, "policies holds 2 of NormBound"),
         ({"policies": (p.RandomWalk(), p.PeriodicForgetting())}, "exclude each other"),

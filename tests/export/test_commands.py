@@ -1,6 +1,7 @@
 """`piezoest export`: what it writes and refuses."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -98,6 +99,9 @@ def test_the_delay_that_identify_measured_is_told_the_estimator(model: Path) -> 
         estimator = pz.HysteresisRLS(50_000.0, initial_model=START, delay=delay)
         code = pz.export.c(estimator, pz.InverseCompensator(START, limits))
         assert Path("out/piezoest_controller.c").read_text() == code.source
+    for damaged in ([1.5], "abc", -1.0, math.inf):
+        model.write_text(json.dumps({**found, "delay_samples": damaged}))
+        refused(run("c", model, "-o", "out"), "delay_samples must be")
 
 
 def test_tables_are_written(model: Path) -> None:
