@@ -21,7 +21,7 @@ from piezoest.bench.scenarios import SCENARIOS, UNREPEATED
 from piezoest.bench.statistics import NEEDS, QUANTITIES, interval, order, relative
 from piezoest.bench.store import Row
 
-RUNS, PERIODS, DOCUMENT = "runs", "periods", "table.json"
+RUNS, PERIODS = "runs", "periods"
 PERIOD_COLUMNS: dict[str, type] = {
     "key": str, "stage": str, "scenario": str, "estimator": str, "seed": int, "period": int, "error": float,
 }  # fmt: skip

@@ -17,6 +17,7 @@ from piezoest.bench import shared
 from piezoest.bench.origin import json_safe, origin, put
 
 FOLDER, QUICK_FOLDER = Path("bench-results"), Path("bench-results-quick")
+DOCUMENT = "table.json"
 SEEDS, SLOW_SEEDS = 30, 10
 HEAD = ("date", "machine", "versions", "code", "runs")
 
@@ -117,13 +118,13 @@ def table(context: typer.Context, runs: Runs, how: How, json_to: shared.Json = N
 
     began = time.perf_counter()
     document = _run(runs, how, folder, began)
-    put(document, folder / "table.json")
+    put(document, folder / DOCUMENT)
     shared.write_html(document, how.html)
     if how.figures is not None:
         from piezoest.bench.figures import drawings, write_figures
 
         write_figures(drawings(document), how.figures, quiet=json_to == "-")
-    shared.show(document, json_to, print_table, f"Tables and table.json: {folder}")
+    shared.show(document, json_to, print_table, f"Tables and {DOCUMENT}: {folder}")
     if document["all_failed"]:
         raise typer.Exit(USER_ERROR)
 
@@ -221,9 +222,9 @@ def compare(
 
 def _read(folder: Path) -> dict[str, Any]:
     """Document of a campaign's folder."""
-    path = folder / "table.json"
+    path = folder / DOCUMENT
     if not path.exists():
-        raise ValueError(f"{folder} holds no table.json: no campaign of piezoest bench was finished there")
+        raise ValueError(f"{folder} holds no {DOCUMENT}: no campaign of piezoest bench was finished there")
     match read_json(path):
         case {"conditions": {}, **rest} as document if all(name in rest for name in HEAD):
             return dict(document)
