@@ -17,7 +17,7 @@ WILDEST = 1e9
 MODERATE = 1e20
 
 
-def finite(name: str, value: Any) -> float:
+def finite(name: str, value: Any, kind: str = "a plain float") -> float:
     """Return `value` as a finite float."""
     if type(value) is float and math.isfinite(value):
         return value  # a live loop makes a model now and then
@@ -28,7 +28,7 @@ def finite(name: str, value: Any) -> float:
     except OverflowError:
         raise ValueError(f"{name} must be a number of at most 1.8e308: check where it comes from") from None
     except (TypeError, ValueError):
-        raise ValueError(f"{name} must be one number, got {value!r}: pass a plain float") from None
+        raise ValueError(f"{name} must be one number, got {value!r}: pass {kind}") from None
     if not math.isfinite(number):
         raise ValueError(f"{name} must be finite, got {number}: check where it was computed")
     return number
@@ -80,7 +80,7 @@ def fraction(name: str, value: Any, low: float = 0.0, high: float = 1.0) -> floa
 
 def integer(name: str, value: Any, minimum: int = 0, maximum: int | None = None) -> int:
     """Return `value` as an int from `minimum` to `maximum`; 3.0 passes, 3.5 does not."""
-    number = finite(name, value)
+    number = finite(name, value, "an int")
     if number != int(number) or number < minimum or (maximum is not None and number > maximum):
         bounds = f"of at least {minimum}" if maximum is None else f"from {minimum} to {maximum}"
         raise ValueError(f"{name} must be a whole number {bounds}, got {value!r}")
@@ -171,8 +171,20 @@ def fields(name: str, data: Any, needed: Iterable[str], optional: Iterable[str] 
     return data
 
 
-def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: int = 0) -> FloatArray:
-    """Return `value` as a contiguous float64 array of shape (N,)."""
+def rate_of(value: Any, stated: float | None) -> float | None:
+    """Sample rate that was stated, else that of a `Signal`."""
+    return getattr(value, "sample_rate", None) if stated is None else stated
+
+
+def array_1d(
+    name: str,
+    value: Any,
+    *,
+    allow_nan: bool = False,
+    minimum_length: int = 0,
+    sample_rate: float | None = None,
+) -> FloatArray:
+    """Return `value` as a contiguous float64 array of shape (N,); a `Signal` of another rate is refused."""
     if (
         allow_nan
         and type(value) is np.ndarray
@@ -184,6 +196,9 @@ def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: 
         return value
     if value is None:
         raise ValueError(f"{name} must be an array, got None")
+    own = rate_of(value, None)
+    if own is not None and sample_rate is not None and own != sample_rate:
+        raise ValueError(f"sample rates differ: {name} has {own:g} Hz, {sample_rate:g} Hz is expected")
     array = as_floats(name, value)
     if array.ndim != 1:
         hint = f"pass one column, as {name}[:, 0]"

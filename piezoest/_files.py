@@ -28,6 +28,8 @@ def check_targets(
             raise ValueError(f"{path}: its name must end in one of {' '.join(endings)}")
         if path.resolve() in kept:
             raise ValueError(f"{path} is named twice: give what is written a file of its own")
+        if path.name == "-":
+            raise ValueError("- is no file: name one, or /dev/stdout")
         if path.is_dir():
             raise ValueError(f"{path} is a folder: name a file in it")
         if not path.resolve().parent.is_dir():
@@ -81,7 +83,7 @@ def save_figure(figure: Any, path: str | Path, **options: Any) -> None:
 def read_json(path: str | Path) -> Any:
     """What a JSON file holds. OSError if it cannot be read."""
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
+        return json.loads(Path(path).read_text(encoding="utf-8-sig"))  # editors of Windows add a mark
     except ValueError as error:
         raise ValueError(f"{path} is not JSON: {error}") from None
     except RecursionError:

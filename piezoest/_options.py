@@ -63,6 +63,16 @@ def one_of(*known: str) -> Callable[[str | None], str | None]:
     return check
 
 
+def pairs(option: str, example: str, text: str | None) -> dict[str, str] | None:
+    """``voltage=u,displacement=3`` as a dictionary."""
+    if text is None:
+        return None
+    given = [pair.partition("=") for pair in text.split(",")]
+    if any(not name.strip() or not value.strip() for name, _, value in given):
+        raise typer.BadParameter(f"{text!r} does not read like {example}", param_hint=option)
+    return {name.strip(): value.strip() for name, _, value in given}
+
+
 def _options(group: Any) -> list[inspect.Parameter]:
     types = get_type_hints(group, include_extras=True)
     return [

@@ -262,11 +262,12 @@ def track(
     >>> round(record.max_error(last_periods=1), 2)
     0.03
     """
-    _check_driver(compensator, estimator, controller)
-    if not (hasattr(stage, "step") or hasattr(stage, "run")):
+    if isinstance(stage, type) or not (hasattr(stage, "step") or hasattr(stage, "run")):
         raise ValueError(f"stage must have step(u), or run(u), got {type(stage).__name__}")
+    _check_driver(compensator, estimator, controller)
     reference = array_1d("r", r, minimum_length=1)
-    rate = _sample_rate(sample_rate, r=r, stage=stage, estimator=estimator, controller=controller)
+    parts = {"compensator": compensator, "estimator": estimator, "controller": controller}
+    rate = _sample_rate(sample_rate, r=r, stage=stage, **parts)
     if not allow_jumps:
         check_continuity(reference, rate, "r")
     interval = integer("update_interval", update_interval, 1)
@@ -298,7 +299,14 @@ def track(
 
 
 def _check_driver(compensator: Any, estimator: Any, controller: Any) -> None:
-    """Refuse two that give the voltage, and none."""
+    """Refuse two that give the voltage, none, and what is no object that can."""
+    needed = ((compensator, "compensator", ("step",)), (estimator, "estimator", ("step", "model")),
+              (controller, "controller", ("step", "learn")))  # fmt: skip
+    for part, name, methods in needed:
+        if isinstance(part, type):
+            raise ValueError(f"{name} must be an object, got the class: make one, as {part.__name__}(...)")
+        if part is not None and (missing := [each for each in methods if not hasattr(part, each)]):
+            raise ValueError(f"{name} must have {' and '.join(missing)}, got {type(part).__name__}")
     if controller is None:
         if compensator is None:
             raise ValueError("nothing gives the voltage: pass compensator= or controller=")

@@ -89,9 +89,8 @@ def class_of(name: str) -> type:
     cls = imported(name)
     if not inspect.isclass(cls):
         raise ValueError(f"{name} is no class")
-    needed = ("step", "learn") if hasattr(cls, "learn") else ("step", "model")
-    if missing := [each for each in needed if not hasattr(cls, each)]:
-        raise ValueError(f"{name} has no {' and no '.join(missing)}: see piezoest.Estimator")
+    if not hasattr(cls, "step"):
+        raise ValueError(f"{name} has no step: see piezoest.Estimator")
     return cls
 
 

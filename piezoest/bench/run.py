@@ -101,6 +101,8 @@ def follow(case: Case, estimator: str) -> TrackingRecord:
         made = candidate(estimator)(rate, case.start)
         if hasattr(made, "learn"):
             return track(case.reference, stage=case.new_stage(), controller=made)
+        if not hasattr(made, "model"):
+            raise ValueError(f"{estimator} has no model: see piezoest.Estimator")
         start = case.linear_start if isinstance(made.model, LinearGain) else case.start
         compensator = InverseCompensator(start, LIMITS, transfer_samples=transfer)
     return track(

@@ -10,7 +10,7 @@ import typer
 
 from piezoest._errors import Debug, errors
 from piezoest._files import check_targets
-from piezoest._options import HIGHEST, LOWEST, examples, grouped, warn_if_unbounded
+from piezoest._options import HIGHEST, LOWEST, examples, grouped, pairs, warn_if_unbounded
 from piezoest._progress import LOADING, progress
 
 if TYPE_CHECKING:
@@ -70,6 +70,9 @@ def compensate(
     stated: Stated,
     limits: Limits,
     column: Annotated[str | None, typer.Option(help="Column of the reference, if not guessed.")] = None,
+    units: Annotated[
+        str | None, typer.Option(help="What 1 in a column stands for: reference=nm,time=ms.")
+    ] = None,
     sample_rate: Annotated[float | None, typer.Option(help="Hz, if there is no column of time.")] = None,
     debug: Debug = False,
 ) -> None:
@@ -92,10 +95,14 @@ def compensate(
             learnt = _model(stated)
             given = {name: value for name, value in asdict(limits).items() if value is not None}
             voltage_limits = VoltageLimits(**given)
-            signal, title = named_reference(reference, column, sample_rate)
+            signal, title = named_reference(
+                reference, column, pairs("--units", "reference=nm", units), sample_rate
+            )
             compensator = InverseCompensator(learnt.model, voltage_limits, sample_rate=signal.sample_rate)
             check_continuity(signal.values, signal.sample_rate, "the reference")
             voltage = compensator.run(signal.values)
+            if compensator.status.missing:
+                raise ValueError("the model has no voltage for this reference: check units and offset")
             columns = {"time_s": signal.time, "voltage_V": voltage, "reference_um": signal.values}
             write_columns(output, columns, allow_nan=False)
         typer.echo(f"reference: column {title}")

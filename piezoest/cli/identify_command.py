@@ -12,7 +12,7 @@ from rich.console import Console
 
 from piezoest._errors import Debug, errors
 from piezoest._files import check_targets, save_figure, write_text
-from piezoest._options import examples, grouped
+from piezoest._options import examples, grouped, pairs
 from piezoest._progress import LOADING, Shown, progress
 
 if TYPE_CHECKING:
@@ -54,8 +54,8 @@ class Reading:
     def options(self) -> dict[str, Any]:
         """Keyword arguments of `read_record` and `stream_record`."""
         return {
-            "columns": _pairs("--columns", "voltage=u,displacement=3", self.columns),
-            "units": _pairs("--units", "voltage=mV,displacement=nm", self.units),
+            "columns": pairs("--columns", "voltage=u,displacement=3", self.columns),
+            "units": pairs("--units", "voltage=mV,displacement=nm", self.units),
             "sample_rate": self.sample_rate,
         }
 
@@ -203,16 +203,6 @@ def _named(file: Path) -> Path:
     from piezoest.records import example_log
 
     return example_log() if str(file) == "example" and not file.exists() else file
-
-
-def _pairs(option: str, example: str, text: str | None) -> dict[str, str] | None:
-    """``voltage=u,displacement=3`` as a dictionary."""
-    if text is None:
-        return None
-    pairs = [pair.partition("=") for pair in text.split(",")]
-    if any(not name.strip() or not value.strip() for name, _, value in pairs):
-        raise typer.BadParameter(f"{text!r} does not read like {example}", param_hint=option)
-    return {name.strip(): value.strip() for name, _, value in pairs}
 
 
 def _delay(text: str) -> float | Literal["auto"]:

@@ -9,7 +9,7 @@ import numpy as np
 from piezoest._checks import FloatArray, array_1d, instance, integer, measured, number_or_nan, positive
 from piezoest.compensators import corridor
 from piezoest.compensators import inverse_kernel as kernel
-from piezoest.compensators.limits import VoltageLimits, resting
+from piezoest.compensators.limits import VoltageLimits, check_rate, resting
 from piezoest.layout import Copied, Named, Record, new
 from piezoest.models import Model
 
@@ -72,9 +72,10 @@ class Compensator(Copied):
     ) -> None:
         limits = instance("limits", limits, VoltageLimits | None, "VoltageLimits(minimum, maximum)")
         self._limits: VoltageLimits = limits or VoltageLimits()
-        self._sample_rate = (
-            self._limits.sample_rate if sample_rate is None else positive("sample_rate", sample_rate)
-        )
+        self._sample_rate = self._limits.sample_rate
+        if sample_rate is not None:
+            self._sample_rate = positive("sample_rate", sample_rate)
+            check_rate(self._limits, self._sample_rate)
         transfer_samples = integer("transfer_samples", transfer_samples)
         if method not in ("closed-form", "bogacki-shampine"):
             raise ValueError(f"method must be 'closed-form' or 'bogacki-shampine', got {method!r}")
@@ -232,6 +233,13 @@ class Compensator(Copied):
         kernel.go_on(*self._named(), expected, stays)
 
     @property
+    def sample_rate(self) -> float | None:
+        """That of the loop [Hz]; None if it was not given, and nothing depends on it."""
+        if self._sample_rate is None and getattr(self._model, "creep", None) is not None:
+            return getattr(self._model, "sample_rate", None)
+        return self._sample_rate
+
+    @property
     def limits(self) -> VoltageLimits:
         """Limits that the voltage never leaves."""
         return self._limits
@@ -286,7 +294,7 @@ class Compensator(Copied):
         ValueError
             If r is not a 1-D array of numbers.
         """
-        r = array_1d("r", r, allow_nan=True)
+        r = array_1d("r", r, allow_nan=True, sample_rate=self.sample_rate)
         u = np.empty_like(r)
         start = 0
         while self._waiting is not None and start < r.size:
@@ -299,11 +307,13 @@ class Compensator(Copied):
 class AroundCompensator(Copied, ABC):
     """What is put around a feed-forward compensator, and shows its model, limits and status."""
 
-    __slots__ = ("_compensator",)
+    __slots__ = ("_compensator", "_sample_rate")
 
-    def __init__(self, compensator: Compensator) -> None:
+    def __init__(self, compensator: Compensator, sample_rate: float) -> None:
         expected = "a LinearCompensator or an InverseCompensator"
         self._compensator = instance("compensator", compensator, Compensator, expected)
+        self._sample_rate = positive("sample_rate", sample_rate)
+        check_rate(compensator, self._sample_rate, "the compensator is")
 
     def __repr__(self) -> str:
         """Class, and what it is around."""
@@ -317,6 +327,11 @@ class AroundCompensator(Copied, ABC):
     @model.setter
     def model(self, model: Model) -> None:
         self._compensator.model = model
+
+    @property
+    def sample_rate(self) -> float:
+        """That of the loop [Hz]."""
+        return self._sample_rate
 
     @property
     def compensator(self) -> Compensator:

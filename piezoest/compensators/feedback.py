@@ -2,10 +2,12 @@
 
 import math
 
-from piezoest._checks import number_or_nan, positive
+from piezoest._checks import WILDEST, number_or_nan, positive
 from piezoest.compensators import corridor
 from piezoest.compensators.base import AroundCompensator, Compensator
-from piezoest.compensators.limits import check_rate
+
+# Times the sample rate: from this gain on each correction overshoots by more than what it corrects.
+UNSTABLE = 2.0
 
 
 class IntegralFeedback(AroundCompensator):
@@ -26,8 +28,8 @@ class IntegralFeedback(AroundCompensator):
     Raises
     ------
     ValueError
-        If the compensator is none, its limits are for another sample rate, or the gain or the sample rate is
-        not above zero.
+        If the compensator is none or for another sample rate, the sample rate is not above zero, or the gain
+        does not lie between zero and twice the sample rate.
 
     Notes
     -----
@@ -50,9 +52,10 @@ class IntegralFeedback(AroundCompensator):
     needs_measurement = True
 
     def __init__(self, compensator: Compensator, *, gain: float, sample_rate: float) -> None:
-        super().__init__(compensator)
-        check_rate(self.limits, sample_rate)
-        self._step_gain = positive("gain", gain) / positive("sample_rate", sample_rate)
+        super().__init__(compensator, sample_rate)
+        self._step_gain = positive("gain", gain) / self._sample_rate
+        if self._step_gain >= UNSTABLE:
+            raise ValueError(f"gain must be below {UNSTABLE:g} times the sample rate, got {gain:g} 1/s")
         self._begin()
         # One wild reading winds nothing up.
         self._reach = float(compensator.state["corridor"]["least"]) / corridor.LEAST
@@ -77,7 +80,7 @@ class IntegralFeedback(AroundCompensator):
             is none.
         """
         r, x = number_or_nan(r), number_or_nan(x)
-        if math.isfinite(x) and math.isfinite(r):
+        if abs(x) <= WILDEST and math.isfinite(r):
             growth = self._step_gain * min(max(r - x, -self._reach), self._reach)
             limited = self._compensator.limited
             # Where the stage falls as the voltage rises, more displacement is less voltage.

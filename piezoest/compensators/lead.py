@@ -90,18 +90,29 @@ class LeadFilter(AroundCompensator):
         delay: float = 0.0,
         smoothing: float | None = None,
     ) -> None:
-        super().__init__(compensator)
+        super().__init__(compensator, sample_rate)
         instance("mechanics", mechanics, MassSpringDamper, "a MassSpringDamper")
         omega = 2.0 * np.pi * mechanics.natural_frequency
         coefficients = lead_coefficients(
             mechanics.natural_frequency,
             mechanics.damping_ratio,
-            finite("delay", delay),
+            self._lag(delay, mechanics),
             1.0 / omega if smoothing is None else positive("smoothing", smoothing),
-            1.0 / positive("sample_rate", sample_rate),
+            1.0 / self._sample_rate,
         )
         self._settings = new(SETTINGS, **coefficients)
         self._begin()
+
+    @staticmethod
+    def _lag(delay: float, mechanics: MassSpringDamper) -> float:
+        """Return a delay [s] that a lead can undo."""
+        longest = 1.0 / mechanics.natural_frequency
+        if not 0.0 <= finite("delay", delay) <= longest:
+            raise ValueError(
+                "delay is in seconds, and must lie between zero and a period of the resonance, "
+                f"{longest:.3g} s, got {delay:g}"
+            )
+        return delay
 
     def _begin(self) -> None:
         self._state = new(STATE)
@@ -126,6 +137,6 @@ class LeadFilter(AroundCompensator):
         r : array_like, shape (N,)
             As in `InverseCompensator.run`.
         """
-        lead = array_1d("r", r, allow_nan=True).copy()
+        lead = array_1d("r", r, allow_nan=True, sample_rate=self._sample_rate).copy()
         _run.of(STATE, SETTINGS)(self._state, self._settings, lead)
         return self._compensator.run(lead)

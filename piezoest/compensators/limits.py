@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import Any
 
+import numpy as np
+
 from piezoest._checks import finite, positive
 
 
@@ -65,11 +67,11 @@ class VoltageLimits:
         return finite("rest", min(max(0.0, self.minimum), self.maximum))
 
 
-def check_rate(limits: VoltageLimits, sample_rate: float) -> None:
-    """Refuse limits for another sample rate: the slew rate would be another."""
-    if limits.sample_rate is not None and limits.sample_rate != sample_rate:
+def check_rate(part: Any, sample_rate: float, called: str = "limits are") -> None:
+    """Refuse limits or a compensator for another sample rate: slew rate and creep would be others."""
+    if part.sample_rate is not None and part.sample_rate != sample_rate:
         raise ValueError(
-            f"limits are for {limits.sample_rate:g} Hz, sample_rate is {sample_rate:g} Hz: give both the same"
+            f"{called} for {part.sample_rate:g} Hz, sample_rate is {sample_rate:g} Hz: give both the same"
         )
 
 
@@ -85,6 +87,9 @@ def resting(limits: VoltageLimits, voltage: Any) -> float:
 
 def _bound(name: str, value: Any) -> float:
     """One number, infinite or not."""
-    if not isinstance(value, Real):
-        raise ValueError(f"{name} must be a number of volts, got {value!r}: leave it out for no limit")
-    return float(value)
+    try:
+        if isinstance(value, Real) or (np.ndim(value) == 0 and isinstance(value, np.ndarray)):
+            return float(value)
+    except (OverflowError, TypeError, ValueError):
+        pass
+    raise ValueError(f"{name} must be a number of volts, got {value!r}: leave it out for no limit")

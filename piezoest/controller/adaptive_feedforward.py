@@ -266,7 +266,7 @@ class AdaptiveFeedforward(Face):
         ValueError
             If r is not a 1-D array of numbers.
         """
-        r = array_1d("r", r, allow_nan=True).copy()
+        r = array_1d("r", r, allow_nan=True, sample_rate=self._sample_rate).copy()
         u = np.empty_like(r)
         # A copy through bytes: NumPy's own goes through a nested structure field by field.
         given = zip(self._layouts, (self._state, self._settings), strict=True)

@@ -305,8 +305,8 @@ class EstimatorBase(Copied, ABC):
 
     def _records(self, u: Any, x: Any) -> tuple[FloatArray, FloatArray]:
         """Check records, and finish what `predict` has left over."""
-        u = array_1d("u", u, allow_nan=True)
-        x = array_1d("x", x, allow_nan=True)
+        u = array_1d("u", u, allow_nan=True, sample_rate=self.sample_rate)
+        x = array_1d("x", x, allow_nan=True, sample_rate=self.sample_rate)
         if u.size != x.size:
             raise ValueError(f"u and x must have the same length, got {u.size} and {x.size}")
         if self._pending is not None:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest._checks import FloatArray, finite
+from piezoest._checks import FloatArray, as_floats, finite
 from piezoest.equations.bent_plays import between
 from piezoest.equations.creep import unit_creep_step
 from piezoest.equations.play import play, sum_of_first
@@ -112,7 +112,7 @@ def _of_loop(initial: ColemanHodgdon, given: Any, thresholds: int, bends: int, t
 
 def _middle(voltage_range: Any) -> tuple[float, float]:
     """Middle and half-width of a range of voltage."""
-    values = np.asarray(voltage_range, dtype=np.float64)
+    values = as_floats("voltage_range", voltage_range)
     if values.shape != (2,) or not values[0] < values[1]:
         raise ValueError(f"voltage_range must be (least, largest) in V, got {voltage_range!r}")
     low, high = (finite("voltage_range", float(value)) for value in values)

@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, finite, integer, moderate, number_or_nan
+from piezoest._checks import FloatArray, array_1d, as_floats, finite, integer, moderate, number_or_nan
 from piezoest.estimators import recursive_least_squares_kernel as kernel
 from piezoest.layout import Copied, new, record
 from piezoest.policies import Normalisation, Policy, check_policies
@@ -157,7 +157,7 @@ def is_discrete(time_base: TimeBase) -> bool:
 
 def covariance_matrix(name: str, value: Any, n: int) -> FloatArray:
     """Return a matrix, its diagonal or one variance as a symmetric positive definite (n, n) array."""
-    matrix = np.asarray(value, dtype=np.float64)
+    matrix = as_floats(name, value)
     if matrix.ndim == 0:
         matrix = finite(name, value) * np.eye(n)
     elif matrix.ndim == 1:

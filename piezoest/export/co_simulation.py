@@ -99,11 +99,11 @@ def fmu(
 
 
 def _sample_rate(estimator: Any, compensator: Compensator, given: float | None) -> float:
-    known = getattr(estimator, "sample_rate", None) or compensator.limits.sample_rate
+    known = getattr(estimator, "sample_rate", None) or compensator.sample_rate
     if given is None and known is None:
-        raise ValueError("sample_rate is unknown: pass sample_rate= in Hz")
+        raise ValueError("sample_rate is unknown: pass sample_rate=, or --sample-rate, in Hz")
     if given is not None and known is not None and given != known:
-        raise ValueError(f"sample_rate is {given:g} Hz, but estimator or limits say {known:g} Hz")
+        raise ValueError(f"sample_rate is {given:g} Hz, but estimator or compensator say {known:g} Hz")
     return positive("sample_rate", known if given is None else given)
 
 

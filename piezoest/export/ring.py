@@ -62,7 +62,7 @@ def check_limits(estimator: Any, compensator: Compensator) -> None:
     """Refuse limits for another sample rate than the estimator's."""
     rate = getattr(estimator, "sample_rate", None)
     if rate is not None:
-        check_rate(compensator.limits, rate)
+        check_rate(compensator, rate, "the compensator is")
 
 
 class Ring:

@@ -111,12 +111,13 @@ def table(
     before = None
     periods = 2
     while True:
-        voltage = invert(np.tile(period, periods))[-period.size :]
+        # As a signal it has its rate, on which creep depends.
+        voltage = invert(Signal(np.tile(period, periods), rate))[-period.size :]
         if before is not None and np.max(np.abs(voltage - before)) <= _SETTLED * np.max(np.abs(voltage)):
             break
         if periods > _MOST_PERIODS:
             raise ValueError(
-                "the loop of this model does not settle on the reference; with creep it never does: "
+                "the loop of this model does not settle on the reference; with slow creep it never does: "
                 "identify with --model plays or plays-asymmetric"
             )
         before, periods = voltage, 2 * periods

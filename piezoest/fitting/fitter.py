@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, fraction, positive
+from piezoest._checks import FloatArray, array_1d, fraction, instance, positive
 from piezoest.fitting import search, trust
 from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.design import Design
@@ -123,10 +123,11 @@ class Fitter:
         plays: bool = True,
         tells_lag: bool = True,
     ) -> None:
-        u, x = (array_1d(name, each, allow_nan=True) for name, each in (("u", u), ("x", x)))
+        self._rate = positive("sample_rate", sample_rate)
+        rate = self._rate
+        u, x = (array_1d(*each, allow_nan=True, sample_rate=rate) for each in (("u", u), ("x", x)))
         if u.size != x.size:
             raise ValueError(f"u and x must have one length, got {u.size} and {x.size}")
-        self._rate = positive("sample_rate", sample_rate)
         counts = np.isfinite(u) & np.isfinite(x)
         if np.count_nonzero(counts) < FEWEST_SAMPLES:
             raise ValueError(
@@ -134,7 +135,7 @@ class Fitter:
                 "needed"
             )
         delay = search.checked_delay(delay)
-        flaws = flawed(u, x) if flaws is None else flaws
+        flaws = flawed(u, x) if flaws is None else instance("flaws", flaws, Flaws, "what flawed() gave")
         if flaws.unusable.size != u.size:
             raise ValueError(f"flaws must be those of u and x: {u.size} samples, got {flaws.unusable.size}")
         u = flaws.without(u)

@@ -114,8 +114,8 @@ class Fit:
         """
         if u is None:
             return self.continued(self._u)
-        half = self.spread.along(_without_gaps(u), np.zeros(1))
         x = self.elsewhere(u)
+        half = self.spread.along(_without_gaps(u), np.zeros(1))
         return Prediction(x, x - half, x + half)
 
     def elsewhere(self, u: FloatArray, *, sample_rate: float | None = None) -> FloatArray:
@@ -128,8 +128,9 @@ class Fit:
         sample_rate : float, optional
             [Hz]; by default that of the fitted record.
         """
-        u, own = _without_gaps(u), self._design.sample_rate
+        own = self._design.sample_rate
         rate = own if sample_rate is None else positive("sample_rate", sample_rate)
+        u = _without_gaps(u, rate)
         v = late(u, self.delay * rate / own)
         design, w = replace(self._design.afresh(v[0]), sample_rate=rate), self._w.copy()
         w[design.crept] = self._rest
@@ -146,7 +147,7 @@ class Fit:
         u : array_like, shape (N,)
             [V].
         """
-        u = _without_gaps(u)
+        u = _without_gaps(u, self._design.sample_rate)
         x = self._design.output(late(u, self.delay), self._w)
         half = self.spread.along(u, np.maximum(np.arange(u.size) / self._u.size - 1.0, 0.0))
         return Prediction(x, x - half, x + half)
@@ -158,8 +159,8 @@ class Fit:
         )
 
 
-def _without_gaps(u: FloatArray) -> FloatArray:
-    u = array_1d("u", u, allow_nan=True)
+def _without_gaps(u: FloatArray, sample_rate: float | None = None) -> FloatArray:
+    u = array_1d("u", u, allow_nan=True, sample_rate=sample_rate)
     if not np.any(np.isfinite(u)):
         raise ValueError(f"u must hold a voltage, none of its {u.size} samples is a number")
     return bridged(u)

@@ -108,7 +108,7 @@ def identify(
     train = fraction("train", train, 0.1, 0.9)
     record = as_record(data, displacement, sample_rate=sample_rate, columns=columns, units=units)
     logs = instance("validate", validate, (list, tuple), "a list of logs: validate=[log]")
-    others = [as_record(each) for each in logs]
+    others = [as_record(each, called=f"validate[{i}]") for i, each in enumerate(logs)]
     validated = [(each, flawed(each.voltage, each.displacement)) for each in others]
     for each, its in validated:
         check_enough("part to validate", each.source, int(np.count_nonzero(judged(each, its))))

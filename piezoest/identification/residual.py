@@ -108,7 +108,7 @@ class Oscillation(NamedTuple):
     """The strongest oscillation of a residual."""
 
     frequency: float  # [Hz]
-    share: float  # part of the residual's square that it makes
+    share: float  # part that it makes of the residual's square, without a steady drift
 
     @classmethod
     def of(cls, residual: FloatArray, sample_rate: float) -> Oscillation:
@@ -118,15 +118,15 @@ class Oscillation(NamedTuple):
         """
         from scipy import signal
 
-        known = np.isfinite(residual)
+        known = np.flatnonzero(np.isfinite(residual))
         length = residual.size // SEGMENTS
         if length < 4 * PEAK:
             return cls(0.0, 0.0)
-        e = np.where(known, residual - np.mean(residual[known]), 0.0)
-        _, power = signal.welch(e, nperseg=length, noverlap=0, detrend=False)
-        power[:PEAK] = 0.0
-        k = int(np.argmax(power))
-        share = float(np.sum(power[max(k - PEAK, 0) : k + PEAK + 1]) / max(float(np.sum(power)), 1e-300))
+        e = np.zeros(residual.size)
+        e[known] = residual[known] - np.polyval(np.polyfit(known, residual[known], 1), known)
+        _, power = signal.welch(e, nperseg=length, detrend=False)
+        k = PEAK + int(np.argmax(power[PEAK:]))
+        share = float(np.sum(power[k - PEAK : k + PEAK + 1]) / max(float(np.sum(power)), 1e-300))
         # Between two frequencies of the spectrum both have some of it.
         near = np.arange(max(k - 1, 0), min(k + 2, power.size))
         place = float(near @ np.sqrt(power[near]) / max(np.sum(np.sqrt(power[near])), 1e-300))

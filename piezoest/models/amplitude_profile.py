@@ -58,6 +58,12 @@ class AmplitudeProfile:
         object.__setattr__(self, "swings", swings)
         object.__setattr__(self, "theta", theta)
 
+    def __eq__(self, other: object) -> bool:
+        return self.to_dict() == other.to_dict() if isinstance(other, AmplitudeProfile) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(repr(self.to_dict()))
+
     def at(self, swing: float) -> ColemanHodgdon:
         """Model for a size of swing: interpolated, and beyond the ends that of the nearest.
 
@@ -134,4 +140,8 @@ class AmplitudeProfile:
         ValueError
             If the file holds no profile.
         """
-        return cls.from_dict(read_object(path, "profile"))
+        data = read_object(path, "profile")
+        try:
+            return cls.from_dict(data)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None

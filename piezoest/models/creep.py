@@ -122,7 +122,7 @@ class Creep(AsFields):
         ValueError
             If w is not a finite 1-D array, or `initial_state` has another length than the gains.
         """
-        x = array_1d("w", w).copy()
+        x = array_1d("w", w, sample_rate=sample_rate).copy()
         z = (
             np.zeros(self.gains.size)
             if initial_state is None

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, as_floats, finite, instance, positive
+from piezoest._checks import FloatArray, array_1d, as_floats, finite, instance, positive, rate_of
 from piezoest.compile import Record, Vector, compiled
 from piezoest.equations import admissible, play_inverse
 from piezoest.equations.bent_plays import bent_plays_step, prandtl_ishlinskii_voltage
@@ -209,15 +209,16 @@ class PrandtlIshlinskii(Model):
             Play states [V] before the first sample, and after them those of the creep terms
             relative to their gains [µm]; zeros if not given.
         sample_rate : float, optional
-            [Hz]; needed with creep only, and there the model's own if not given.
+            [Hz]; needed with creep only. Default: that of a `Signal`, else the model's own.
 
         Raises
         ------
         ValueError
             If u is not a finite 1-D array, no voltage can lead to `initial_state`, or the
-            sample rate is missing.
+            sample rate is missing or another one than that of a `Signal`.
         """
-        x = array_1d("u", u).copy()
+        sample_rate = rate_of(u, sample_rate)
+        x = array_1d("u", u, sample_rate=sample_rate).copy()
         self._through(_simulate, x, initial_state, sample_rate)
         return x
 
@@ -243,7 +244,8 @@ class PrandtlIshlinskii(Model):
                 f"the model has no inverse, its lowest slope is {self._rising.min():g} µm/V, its creep gains "
                 f"sum to {self._creep_gains.sum():g}: {self.remedy}, and negative creep gains above -1 in sum"
             )
-        u = array_1d("r", r).copy()
+        sample_rate = rate_of(r, sample_rate)
+        u = array_1d("r", r, sample_rate=sample_rate).copy()
         self._through(_invert, u, initial_state, sample_rate)
         return finite_voltage(self, u)
 

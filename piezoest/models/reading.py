@@ -26,7 +26,8 @@ def model_from_dict(data: Any) -> Model:
     ValueError
         If the name is unknown or the fields do not fit.
     """
-    classes = [each for each in REGISTERED.values() if not inspect.isabstract(each)]
+    known = [each for each in REGISTERED.values() if not inspect.isabstract(each)]
+    classes = [each for each in known if hasattr(each, "__dataclass_fields__")]  # not their base class
     return class_named(data, "model", classes).from_dict(data)
 
 

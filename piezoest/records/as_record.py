@@ -7,10 +7,8 @@ from typing import Any
 from piezoest.records.frame import is_frame
 from piezoest.records.record import Record, read_record
 
-TAKEN = (
-    "pass a Record, the path of a file, a DataFrame of pandas or Polars, or two arrays: "
-    "voltage, displacement, sample_rate=..."
-)
+TAKEN = "pass a Record, the path of a file or a DataFrame of pandas or Polars"
+ARRAYS = "or two arrays: voltage, displacement, sample_rate=..."
 
 
 def as_record(
@@ -20,6 +18,7 @@ def as_record(
     sample_rate: float | None = None,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
+    called: str = "data",
 ) -> Record:
     """Make a record of a file, a table or arrays.
 
@@ -34,6 +33,8 @@ def as_record(
         [Hz]; must be given with arrays.
     columns, units : mapping of str to str, optional
         With a file or a table only, as for `read_record`.
+    called : str
+        Name of the argument for messages; one that is called otherwise stands alone, and is no array.
 
     Returns
     -------
@@ -66,7 +67,9 @@ def as_record(
     if displacement is None:
         shape = getattr(data, "shape", None)
         got = type(data).__name__ if shape is None else f"one array of shape {tuple(shape)}"
-        raise ValueError(f"data must be a log, got {got} and no displacement: {TAKEN}")
+        if called != "data":
+            raise ValueError(f"{called} must be a log, got {got}: {TAKEN}; make one by Record.from_arrays")
+        raise ValueError(f"data must be a log, got {got} and no displacement: {TAKEN}, {ARRAYS}")
     _refuse(given, ("columns", "units"), "arrays are voltage in V and displacement in µm")
     if sample_rate is None:
         raise ValueError("sample_rate must be given with two arrays, in Hz: sample_rate=10000.0")

@@ -19,6 +19,9 @@ from piezoest.records.writing import write_columns
 if TYPE_CHECKING:
     from piezoest.signals import Signal
 
+# Times may differ from those of the sample rate by this part of a step.
+UNEVEN = 0.1
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Record:
@@ -42,7 +45,7 @@ class Record:
     Raises
     ------
     ValueError
-        If the arrays are not of one shape (N,), or the sample rate is not above zero.
+        If the arrays are not of one shape (N,), the sample rate is not above zero, or the times have another.
 
     Examples
     --------
@@ -69,6 +72,14 @@ class Record:
                     f"{name} must be as long as the {other}, {self.time.size} samples, got {values.size}"
                 )
         object.__setattr__(self, "sample_rate", positive("sample_rate", self.sample_rate))
+        # Rounded times have no other mean step, and a pause no other usual one.
+        steps = np.diff(self.time)
+        fits = (abs(step * self.sample_rate - 1.0) < UNEVEN for step in (np.mean(steps), np.median(steps)))
+        if not any(fits):
+            raise ValueError(
+                f"time has steps of {np.median(steps):.4g} s, {self.sample_rate:g} Hz has "
+                f"{1.0 / self.sample_rate:.4g} s: give the rate of these times, or use Record.from_arrays"
+            )
 
     def __repr__(self) -> str:
         """How long it is, its ranges, and what was noted."""
@@ -283,7 +294,11 @@ def example_log() -> Path:
 
 
 def read_reference(
-    path: str | Path, *, column: str | None = None, sample_rate: float | None = None
+    path: str | Path,
+    *,
+    column: str | None = None,
+    units: Mapping[str, str] | None = None,
+    sample_rate: float | None = None,
 ) -> Signal:
     """Read a reference trajectory from a file of any format that `read_record` reads.
 
@@ -294,6 +309,8 @@ def read_reference(
     column : str, optional
         Name of the column; default one called reference, r, target and the like, else one that
         looks like a displacement.
+    units : mapping of str to str, optional
+        Units of ``"reference"`` and ``"time"``, as for `read_record`.
     sample_rate : float, optional
         [Hz]; if given, a column of time is not needed.
 
@@ -317,11 +334,14 @@ def read_reference(
     >>> pz.records.read_reference("reference.csv").sample_rate
     1000.0
     """
-    return named_reference(path, column, sample_rate)[0]
+    return named_reference(path, column, units, sample_rate)[0]
 
 
 def named_reference(
-    path: str | Path, column: str | None = None, sample_rate: float | None = None
+    path: str | Path,
+    column: str | None = None,
+    units: Mapping[str, str] | None = None,
+    sample_rate: float | None = None,
 ) -> tuple[Signal, str]:
     """Read a reference as `read_reference` does, and the title of the column that it is in."""
     from piezoest.signals import Signal
@@ -329,6 +349,7 @@ def named_reference(
     log = RecordStream(
         path,
         columns={} if column is None else {"reference": column},
+        units=units,
         sample_rate=sample_rate,
         wanted=("reference",),
         held=True,

@@ -96,6 +96,8 @@ class RecordStream:
             )
         self._source = source = path if isinstance(path, Source) else open_source(Path(path))
         notes = []
+        if sample_rate is not None:
+            sample_rate = positive("sample_rate", sample_rate)
         if sample_rate is None and "time" not in named and states_its_rate(source):
             sample_rate = source.sample_rate
             notes.append(f"sample rate of {sample_rate:g} Hz as the file states it")

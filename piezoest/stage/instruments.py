@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from piezoest._checks import FloatArray, finite, integer, non_negative, positive
+from piezoest._checks import FloatArray, as_floats, finite, integer, non_negative, positive
 from piezoest.compile import inlined
 from piezoest.equations.filters import biquad_step, butterworth_low_pass
 from piezoest.layout import COUNT, FIXED, MEASURED, Length, Record, numbers, record
@@ -190,7 +190,8 @@ class Gauge:
 
 
 def _check_range(unit: str, minimum: Any, maximum: Any) -> None:
-    if not minimum <= 0.0 <= maximum or minimum == maximum:
+    low, high = (as_floats(name, each) for name, each in (("minimum", minimum), ("maximum", maximum)))
+    if low.ndim or high.ndim or not low <= 0.0 <= high or low == high:
         raise ValueError(f"minimum and maximum must enclose 0 {unit}, got {minimum} and {maximum}")
 
 

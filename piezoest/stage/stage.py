@@ -7,7 +7,16 @@ from typing import Any, ClassVar, Protocol, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, finite, instance, integer, number_or_nan, positive
+from piezoest._checks import (
+    FloatArray,
+    array_1d,
+    as_floats,
+    finite,
+    instance,
+    integer,
+    number_or_nan,
+    positive,
+)
 from piezoest.layout import Copied, new
 from piezoest.models.creep import Creep
 from piezoest.models.mechanics import MassSpringDamper
@@ -240,7 +249,8 @@ class SimulatedStage(Copied):
         ValueError
             If u is not a 1-D array.
         """
-        x = array_1d("u", u, allow_nan=True).copy()  # voltage, which the kernel turns into displacement
+        # Voltage, which the kernel turns into displacement.
+        x = array_1d("u", u, allow_nan=True, sample_rate=self.sample_rate).copy()
         measured = np.empty_like(x)
         disturbances = self._disturbances(x.size)
         if self._run_loop is None:
@@ -282,7 +292,7 @@ def _schedule(name: str, quantity: str, schedule: Any) -> Schedule | None:
     """A schedule as a function of an array of times; None without one."""
     if schedule is None or callable(schedule):
         return cast(Schedule | None, schedule)
-    table = np.array(schedule, dtype=np.float64)
+    table = as_floats(name, schedule).copy()
     if table.ndim != 2 or table.shape[0] < 1 or table.shape[1] != 2:
         raise ValueError(f"{name} must have shape (M, 2), time and {quantity}, got {table.shape}")
     array_1d(name, table.ravel())

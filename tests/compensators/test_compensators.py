@@ -218,7 +218,7 @@ def test_limits_for_another_rate_are_refused() -> None:
         lambda: pz.export.c(estimator, compensator),
         lambda: pz.track(r, stage=pz.PaperStage(5000.0), compensator=compensator),
     ):
-        with pytest.raises(ValueError, match="sample_rate"):
+        with pytest.raises(ValueError, match=r"sample.rate"):
             call()
 
 
