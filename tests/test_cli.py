@@ -223,6 +223,9 @@ def test_mistakes_in_compensate(reference: Path) -> None:
         ((*THETA, "--minimum", 5, "--maximum", 1, *OUT), "must be below"),
         (("-p", "none.json", *OUT), "none.json"),
         (("-p", "reference.csv", "--alpha", 1, *OUT), "two models"),
+        ((*THETA, "-o", "-"), "- is no file"),
+        ((*THETA, *OUT, "--sample-rate", 0), "sample_rate must be above zero"),
+        ((*THETA, *OUT, "--offset", 1e300), "offset must lie within"),
     ):
         refused(run("compensate", reference, *arguments), *words)
     refused(run("compensate", "jump.csv", *THETA, *OUT), "the reference jumps")
@@ -231,6 +234,7 @@ def test_mistakes_in_compensate(reference: Path) -> None:
         "[1]": "no model",
         '{"model": ["a"]}': "no model",
         '{"model": "Foo"}': "Foo",
+        '\ufeff{"model": "StepModel"}': "StepModel",
         json.dumps({"model": TRUE.to_dict(), "learnt_on": LEARNT_ON | {"rate": "fast"}}): "rate must be one",
         '{"alpha": 1}': "ColemanHodgdon has no 'beta'",
         '{"model": "LinearGain", "gain": 5e-324}': "has no inverse: its gain must not be zero",

@@ -150,6 +150,9 @@ def test_round_trip(tmp_path: Path) -> None:
     assert again.skipped == 1
     with pytest.raises(ValueError, match="displacement must be as long as the voltage"):
         Record.from_arrays(VOLTAGE, DISPLACEMENT[:-1], RATE)
+    for time in (TIME[::-1], 2.0 * TIME):
+        with pytest.raises(ValueError, match="time has steps of"):
+            Record(time, VOLTAGE, DISPLACEMENT, RATE)
 
 
 def test_reference(tmp_path: Path) -> None:
@@ -158,6 +161,7 @@ def test_reference(tmp_path: Path) -> None:
     signal = read_reference(file)
     np.testing.assert_allclose(signal.values, DISPLACEMENT, rtol=1e-8)
     assert signal.sample_rate == pytest.approx(RATE)
+    np.testing.assert_allclose(read_reference(file, units={"reference": "nm"}).values * 1e3, DISPLACEMENT)
     np.testing.assert_allclose(read_reference(file, column="displacement_um").values, VOLTAGE, atol=1e-7)
     write_columns(file, {"time_s": np.delete(TIME, 20), "reference_um": np.delete(DISPLACEMENT, 20)})
     with pytest.raises(ValueError, match="line 22: time jumps here"):

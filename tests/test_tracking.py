@@ -38,6 +38,23 @@ def test_plain_arrays_need_a_rate() -> None:
         pz.PaperStage(FS).run(nothing)
 
 
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [
+        ({**UNITY, "estimator": "rls"}, "estimator must have step and model, got str"),
+        (
+            {**UNITY, "estimator": pz.HysteresisRLS},
+            "must be an object, got the class: make one, as HysteresisR",
+        ),
+        ({"compensator": pz.InverseCompensator}, "compensator must be an object"),
+        ({"controller": object()}, "controller must have step and learn"),
+    ],
+)
+def test_what_is_no_part_of_a_loop_is_refused(parts: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        pz.track(WAVE, stage=pz.PaperStage(FS), **parts)
+
+
 def test_errors_leave_out_missing_readings() -> None:
     readings = [0.0, 1.0, None, 0.5, None, None, None, None]
     stage = SimpleNamespace(step=lambda u: readings.pop(0))

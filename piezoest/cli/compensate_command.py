@@ -101,8 +101,6 @@ def compensate(
             compensator = InverseCompensator(learnt.model, voltage_limits, sample_rate=signal.sample_rate)
             check_continuity(signal.values, signal.sample_rate, "the reference")
             voltage = compensator.run(signal.values)
-            if compensator.status.missing:
-                raise ValueError("the model has no voltage for this reference: check units and offset")
             columns = {"time_s": signal.time, "voltage_V": voltage, "reference_um": signal.values}
             write_columns(output, columns, allow_nan=False)
         typer.echo(f"reference: column {title}")
@@ -135,9 +133,11 @@ def compensate(
 
 def _model(stated: Stated) -> LearntModel:
     """Model from a JSON file, or from the three options."""
+    from piezoest._checks import measured
     from piezoest.models import ColemanHodgdon, LearntModel
 
-    path, offset = stated.parameters, stated.offset
+    path = stated.parameters
+    offset = None if stated.offset is None else measured("offset", stated.offset)
     options = {"alpha": stated.alpha, "beta": stated.beta, "gamma": stated.gamma}
     given = {name: value for name, value in options.items() if value is not None}
     if path is None:

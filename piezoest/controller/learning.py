@@ -228,7 +228,7 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
     beyond = is_held(settings, u, (raw - state.r) * line.gain)
     if np.abs(raw) < WILDEST:
         # Without readings nobody knows whether the line is wrong, as while a block is planned.
-        reach.watch(state, settings, moved)
+        reach.watch(state, settings, moved, gone)
     far = (beyond and state.railed > BEYOND * state.reference.swing) or redraw.is_young(state)
     if far and state.readings.fault == faults.NONE:
         redraw.follow(state)
@@ -238,13 +238,13 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
 @register_jitable
 def _seek(state: Any, settings: Any, u: Any, x: Any) -> None:
     """Look for the gain; when it is found all models begin."""
-    paces.follow(state.pace, state.start, u, x)
+    paces.follow(state.pace, state.start, settings.start, u, x)
     starts.learn(state.start, settings, u, x)
     if state.scale > 0.0:
         slots.advance(state.candidates, settings.candidates, u)
     _name_silence(state, settings)
     if state.start.stage == starts.DONE:
-        paces.conclude(state.pace, state.start, u)
+        paces.conclude(state.pace, state.start, settings.start, u)
         beginning.begin_learning(state)
 
 

@@ -69,8 +69,11 @@ def _is_out_of_reach(state: Any, settings: Any) -> bool:
 
 
 @register_jitable
-def watch(state: Any, settings: Any, moved: Any) -> None:
-    """Start again if the line is wrong: for long at a limit, or with readings that go the wrong way."""
+def watch(state: Any, settings: Any, moved: Any, gone: Any) -> None:
+    """Start again if the line is wrong: for long at a limit, or with readings that go the wrong way.
+
+    `moved`, `gone`: what reference and voltage have moved since the sample before.
+    """
     # A reference that is out of reach is no reason.
     if _is_out_of_reach(state, settings):
         state.railed = 0.0
@@ -78,7 +81,9 @@ def watch(state: Any, settings: Any, moved: Any) -> None:
         if state.beyond - 1.0 < SAID * settings.doubling <= state.beyond:
             faults.notice(state, faults.OUT_OF_REACH)
         return
-    rests = state.u <= settings.minimum or state.u >= settings.maximum
+    # Also at the sample before, for an edge of a square wave is a whole swing.
+    stood = gone == 0.0 or gone >= settings.maximum - settings.minimum
+    rests = stood and (state.u <= settings.minimum or state.u >= settings.maximum)
     # With a line learnt from wrong readings, right readings look reversed, scaled or moved.
     fault = state.readings.fault
     doubted = fault != faults.NO_RESPONSE and fault != faults.SATURATED

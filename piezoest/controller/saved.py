@@ -13,7 +13,7 @@ from piezoest.estimators import saved_state
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import FIXED, NUMBER, Numbers, Record, by_name
 
-FORMAT = 21
+FORMAT = 22
 _FIELDS = (
     "sample_rate", "limits", "corridor", "gain", "feedback", "resonance", "learnt_on", "estimators", "state",
     "models", "planned", "events",

@@ -28,7 +28,7 @@ FEWEST_SAMPLES = 50
 ROUNDING = 1e-9
 # Part of the displacement's scatter that a straight line does not leave, if both belong together.
 UNRELATED = 0.5
-FALLS, OTHER_RUN = "change the sign of one of them", "check that both are of one run and one axis"
+FALLS, OTHER_RUN = "change the sign of one, or undo a delay", "check that both are of one run and one axis"
 # Times that a start which has not settled is looked for, each without what was found before.
 PASSES = 3
 # A jump beside the motion is one if only this part of the squares is left with it.
@@ -320,11 +320,11 @@ class Fitter:
         """The best loop near this one, or near one without delay: to plays, another loop may look late."""
         given = replace(self._log, u=self._given)
         free = self.delay_estimated and (self._tells_lag or self.delay > 0.0)
-        found = polished(given, fitted, self.delay, fit_delay=free)
-        if not free or self.delay == 0.0:
-            return found
-        plain = search.regression(given, LoopColumns(search.best_alpha(given))).best()
-        return min(found, polished(given, plain, 0.0, fit_delay=True), key=lambda each: each.cost)
+        begun = [(fitted, self.delay)]
+        if free and self.delay > 0.0:
+            begun.append((search.regression(given, LoopColumns(search.best_alpha(given))).best(), 0.0))
+        found = (polished(given, *each, fit_delay=free, near=self.delay) for each in begun)
+        return min(found, key=lambda each: each.cost)
 
     def _outcome(self, name: str, fitted: Fitted) -> Fit:
         """Model and figures of a fit, made final by the nonlinear program where there is one."""

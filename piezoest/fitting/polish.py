@@ -21,6 +21,8 @@ from piezoest.models import ColemanHodgdon
 
 # What a record can tell from a straight line: alpha times the voltage's range, and b/c.
 CURVATURES, BENT = (np.exp(-4.0), np.exp(4.0)), (1e-3, 0.4995)
+# Its delay is longer than that of plays by no more than this [samples].
+BEYOND_PLAYS = 2.0
 # Most passes over the record, and the relative change at which it has ended.
 MOST_PASSES, TOLERANCE = 40, 1e-6
 
@@ -40,8 +42,11 @@ class Polished(NamedTuple):
     parameters: int
 
 
-def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Polished:
-    """The optimum near a linear fit; `log.u` is the voltage as it was written, without delay."""
+def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool, near: float) -> Polished:
+    """The optimum near a linear fit; `log.u` is the voltage as it was written, without delay.
+
+    `near`: the delay that plays have; what a loop of another shape leaves looks like more.
+    """
     w, offset = fitted.w.copy(), fitted.design.offset
     others, beside = _beside(log, fitted)
     x = np.where(log.counts, log.x, np.nan)
@@ -49,7 +54,7 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     limits = {
         "alpha": (CURVATURES[0] / (2.0 * log.half), CURVATURES[1] / (2.0 * log.half)),
         "ratio": (1.0 / (1.0 - BENT[0]), 1.0 / (1.0 - BENT[1])),
-        "delay": (0.0, LONGEST_DELAY),
+        "delay": (0.0, min(near + BEYOND_PLAYS, LONGEST_DELAY)),
     }
     held = np.empty(0) if fit_delay else np.array([delay])
     problem = Problem(log.u, x, varied, held, limits=limits, beside=beside)

@@ -30,12 +30,15 @@ ONCE, PARTS, PRICE = 2.0, (1.0 / 6.0, 1.0 / 3.0, 2.0 / 3.0, 1.0), 8.0
 FEW, SMOOTH = 4000, 1e-4
 # A drift is clear if only this part of the squares is left with it.
 CLEAR_DRIFT = 0.25
-# Largest delay that is looked for [samples], and how closely it is found.
-LONGEST_DELAY, CLOSE = 10.0, 0.02
+# Largest delay that is looked for [samples], at first, and where that is too short, if then only this part of
+# the squares is left; how closely it is found.
+USUAL_DELAY, LONGEST_DELAY, LONGER, CLOSE = 10.0, 30.0, 0.8, 0.02
 # Most Gauss-Newton steps of a delay.
 REFINED = 3
 # Gauss-Newton steps of the creep gains, the relative change at which they have settled, the least of them.
 STEPS, SETTLED, LEAST_CREEP = 10, 1e-3, 1e-3
+# A step is too long if it leaves so many times the squares before it.
+WORSE = 1.02
 # Creep terms are a decade apart, from so many samples to so many times the record. None is shorter than this
 # part of the time across the range at about the highest speed: it could not be told from a delay.
 SHORTEST_CREEP, LONGEST_CREEP, MOST_TERMS = 20.0, 1.0, 4
@@ -78,8 +81,8 @@ def missed(log: Log, basis: Basis) -> float:
     return _left(regression(log.thinned(FEW), basis), log.drifts)
 
 
-def _left(found: Regression, drift: bool) -> float:
-    w = found.solved(SMOOTH, found.columns(drift=drift))
+def _left(found: Regression, drift: bool, *, gains: bool = True) -> float:
+    w = found.solved(SMOOTH, found.columns(drift=drift, gains=gains))
     return found.all.missed(w) / max(found.all.rows, 1.0)
 
 
@@ -137,7 +140,14 @@ def best_delay(log: Log, start: Start) -> float:
         moved = replace(log, u=late(log.u, delay))
         return moved, plays(moved, start, bends=BENDS)
 
-    whole = delay = float(min(np.arange(LONGEST_DELAY + 1.0), key=lambda each: missed(*delayed(each))))
+    def best_of(first: float, last: float) -> float:
+        return float(min(np.arange(first, last + 1.0), key=lambda each: missed(*delayed(each))))
+
+    whole = delay = best_of(0.0, USUAL_DELAY)
+    if whole == USUAL_DELAY:
+        longer = best_of(USUAL_DELAY, LONGEST_DELAY)
+        if missed(*delayed(longer)) < LONGER * missed(*delayed(whole)):
+            whole = delay = longer
     for _ in range(REFINED):
         moved, basis = delayed(delay)
         step = delay_step(moved, log.u, regression(moved, basis).best(SMOOTH), delay)
@@ -191,22 +201,33 @@ def creep_times(log: Log) -> FloatArray:
 
 def with_creep(log: Log, plain: Fitted, times: FloatArray) -> Fitted:
     """Fit with creep terms of these time constants, from a fit without; terms that come out as none go."""
-    gains, fitted = np.zeros(times.size), plain
+    gains, fitted, taken = np.zeros(times.size), plain, 0
+    last = np.inf, gains, fitted
     for k in range(STEPS):
         # The smoothness that suits plays without creep is no longer the best once there is some.
-        smoothness = plain.smoothness if k == 0 else None if k == 1 else fitted.smoothness
-        fitted = _crept(log, fitted, Creep(gains, times)).best(smoothness)
+        smoothness = None if taken == 1 else fitted.smoothness
+        crept = _crept(log, fitted, Creep(gains, times))
+        left = _left(crept, crept.design.offset + 1 in fitted.used, gains=False)
+        if left > WORSE * last[0]:
+            # Too long a step: half of it.
+            gains, fitted = 0.5 * (gains + last[1]), last[2]
+            continue
+        last, taken = (left, gains, fitted), taken + 1
+        fitted = crept.best(smoothness)
         step = fitted.w[fitted.design.gains]
         gains = np.maximum(gains + step, 0.0)
-        settled = k > 1 and np.max(np.abs(step)) <= SETTLED * max(float(gains.sum()), SETTLED)
-        if settled or k in (STEPS // 2, STEPS - 1):
-            kept = gains > LEAST_CREEP
+        settled = taken > 2 and np.max(np.abs(step)) <= SETTLED * max(float(gains.sum()), SETTLED)
+        kept = gains > LEAST_CREEP
+        if not np.any(kept) or (settled and np.all(kept)):
+            break
+        if settled or k == STEPS // 2:
             gains, times = gains[kept], times[kept]
-            if not gains.size:
-                return plain
-            if settled and np.all(kept):
-                break
-    return _crept(log, fitted, Creep(gains, times)).best(fitted.smoothness, gains=False)
+            last = np.inf, gains, fitted
+    kept = gains > LEAST_CREEP
+    if not np.any(kept):
+        return plain
+    crept = _crept(log, fitted, Creep(gains[kept], times[kept]))
+    return crept.best(fitted.smoothness, gains=False)
 
 
 def _crept(log: Log, last: Fitted, creep: Creep) -> Regression:

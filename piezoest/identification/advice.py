@@ -100,8 +100,9 @@ def delay_sentences(delay: float, sample_rate: float, known: bool, estimated: bo
     if not known:
         used = f" The fit has {delay:.2g} samples of it." if delay > 0.0 else ""
         return [
-            "The lag of the displacement is not known: all swings of the voltage are alike, so it looks like "
-            f"a wider loop.{used} Record swings of several sizes or frequencies, or pass delay= in samples."
+            "The lag of the displacement is not known: the swings of the voltage differ too little, so it "
+            f"looks like a wider loop.{used} Record swings of several sizes or frequencies, or pass delay= "
+            "in samples."
         ]
     if not estimated:
         return []
@@ -112,8 +113,9 @@ def delay_sentences(delay: float, sample_rate: float, known: bool, estimated: bo
         ]
     if delay > 0.1:
         return [
-            f"The displacement lags the voltage by {delay:.2f} samples ({1e3 * delay / sample_rate:.3g} ms): "
-            f"estimators take delay={delay:.2g}."
+            f"The displacement lags the voltage by about {delay:.2g} samples "
+            f"({1e3 * delay / sample_rate:.2g} ms), or its loop widens with speed: estimators take "
+            f"delay={delay:.2g}."
         ]
     return []
 
@@ -125,7 +127,7 @@ def _creep(found: Identification) -> list[str]:
     percent = f"{100.0 * creep:.2g}" if creep < 1.0 else "over 100"
     has = f"creeps by {percent} %" if creep else "has none"
     return [
-        "Creep is not known: all swings of the voltage are alike and no rest follows them, so creep looks "
+        "Creep is not known: the swings of the voltage differ too little and no rest follows, so it looks "
         f"like a wider loop. The model {has}: where the voltage rests it may be off. Record a rest, too."
     ]
 
@@ -169,12 +171,13 @@ def _remainder(found: Identification) -> list[str]:
     odd = _drift(found) or any(each.severity == "doubt" or each.name == "drift" for each in found.findings)
     if found.fit.form == "line" or found.held_out.rms <= 0.9 * found.line_held_out.rms:
         return said
+    better = found.line_held_out.rms < 0.9 * found.held_out.rms
     if found.train.rms < 0.9 * found.line_train.rms:
         said.append(
-            f"A straight line predicts the held-out part about as well ({found.line_held_out.rms:.2g} µm "
-            f"rms, the model {found.held_out.rms:.2g}), though not the fitted part: do not use this model "
-            "before another log confirms it. The stage or the signal has changed, rings or drifts, or a "
-            "clock is off."
+            f"A straight line predicts the held-out part {'better' if better else 'about as well'} "
+            f"({found.line_held_out.rms:.2g} µm rms, the model {found.held_out.rms:.2g}), though not the "
+            "fitted part: do not use this model before another log confirms it. The stage or the signal has "
+            "changed, rings or drifts, or a clock is off."
         )
     elif not odd:
         said.append("A straight line does about as well: the record shows little hysteresis.")
@@ -202,7 +205,10 @@ def _drift(found: Identification) -> list[str]:
             "beside the model, as creep that slows down: a steady drift goes on faster after the fitted part."
         ]
     if abs(found.drift) > least and not _is_small(found, found.drift):
-        return [f"The displacement drifts by about {found.drift:+.2g} µm over the record against the model."]
+        return [
+            f"The error changes by about {found.drift:+.2g} µm along the record: the displacement drifts, or "
+            "the model goes off in the held-out part."
+        ]
     return []
 
 

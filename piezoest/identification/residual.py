@@ -126,7 +126,7 @@ class Oscillation(NamedTuple):
         e[known] = residual[known] - np.polyval(np.polyfit(known, residual[known], 1), known)
         _, power = signal.welch(e, nperseg=length, detrend=False)
         k = PEAK + int(np.argmax(power[PEAK:]))
-        share = float(np.sum(power[k - PEAK : k + PEAK + 1]) / max(float(np.sum(power)), 1e-300))
+        share = float(np.sum(power[max(k - PEAK, PEAK) : k + PEAK + 1]) / max(float(np.sum(power)), 1e-300))
         # Between two frequencies of the spectrum both have some of it.
         near = np.arange(max(k - 1, 0), min(k + 2, power.size))
         place = float(near @ np.sqrt(power[near]) / max(np.sum(np.sqrt(power[near])), 1e-300))

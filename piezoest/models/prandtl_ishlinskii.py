@@ -197,7 +197,7 @@ class PrandtlIshlinskii(Model):
         return {"gain": self.gain, "thresholds": self.thresholds, "weights": self.weights}
 
     def simulate(
-        self, u: FloatArray, *, initial_state: FloatArray | None = None, sample_rate: float | None = None
+        self, u: Any, *, initial_state: FloatArray | None = None, sample_rate: float | None = None
     ) -> FloatArray:
         """Displacement [µm], shape (N,), for a voltage record; exact for a voltage held over each sample.
 
@@ -223,7 +223,7 @@ class PrandtlIshlinskii(Model):
         return x
 
     def invert(
-        self, r: FloatArray, *, initial_state: FloatArray | None = None, sample_rate: float | None = None
+        self, r: Any, *, initial_state: FloatArray | None = None, sample_rate: float | None = None
     ) -> FloatArray:
         """Voltage [V], shape (N,), under which the model follows a reference exactly.
 

@@ -27,11 +27,20 @@ from tests.bench.shared import SMALL, bench, kept, own_module, said
 OWN = """
 import os
 
+from piezoest import LinearGain
+
 class Still:
     def __init__(self, sample_rate, initial_model, size=1.0):
         self.model = initial_model
 
     model = None
+
+    def step(self, u, x):
+        pass
+
+class Bare:
+    def __init__(self, sample_rate):
+        self.model = LinearGain(0.15)
 
     def step(self, u, x):
         pass
@@ -103,6 +112,11 @@ def test_what_is_no_estimator_is_refused(text: str, words: str) -> None:
         candidate(text)
 
 
+def test_settings_that_are_refused_are_so_before_the_runs() -> None:
+    with pytest.raises(ValueError, match="memory must be above zero"):
+        plan("HysteresisRLS(memory=-1)")
+
+
 def test_a_run_is_a_function_of_its_task() -> None:
     first, again = play(task()), play(task())
     assert first == again
@@ -145,6 +159,7 @@ def test_what_an_estimator_raises_is_its_own_failure(own: str, name: str, failur
     row = play(task(f"{own}:{name}"))
     assert (row["failure"], row["settled"], row["diverged"], row["errors"]) == (failure, None, True, [])
     assert "in step" in row["traceback"]
+    assert play(task(f"{own}:Bare"))["failure"] is None  # its model is no attribute of its class
 
 
 @pytest.mark.parametrize("format", tables.FORMATS)

@@ -103,6 +103,7 @@ def lead(compensator: Any, **options: Any) -> Any:
 later: Any = partial  # of wrong types, too
 LINE = pz.LinearCompensator(pz.LinearGain(0.15))
 CREEPING = pz.PrandtlIshlinskii(0.1, [1.0], [0.2], creep=pz.Creep([0.1], [1.0]))
+SIGNAL = pz.signals.sine(1.0, 5.0, 1, 500.0)
 
 
 @pytest.mark.parametrize(
@@ -117,6 +118,10 @@ CREEPING = pz.PrandtlIshlinskii(0.1, [1.0], [0.2], creep=pz.Creep([0.1], [1.0]))
         (later(pz.IntegralFeedback, MODEL, gain=1.0, sample_rate=1e3), "must be a LinearCompensator or"),
         (later(lead, LINE, mechanics=780.0), "mechanics"),
         (later(lead, LINE, delay=np.nan), "delay"),
+        (later(lead, LINE, delay=2.0), "delay is in seconds, and must lie between zero and a period"),
+        (later(pz.IntegralFeedback, LINE, gain=2e3, sample_rate=1e3), "gain must be below 2 times"),
+        (later(pz.VoltageLimits, 0.0, 10**400), "maximum must be a number of volts"),
+        (later(pz.InverseCompensator(CREEPING, sample_rate=1e3).run, SIGNAL), "rates differ: r has 500 Hz"),
         (later(pz.InverseCompensator(MODEL).run, np.zeros((3, 1))), r"r must have shape .*pass r\.ravel"),
     ],
 )
@@ -208,15 +213,28 @@ def test_feedback_does_not_wind_up_at_a_limit_or_without_a_reading(slope: float)
     assert feedback.integral == 0.0
 
 
-def test_limits_for_another_rate_are_refused() -> None:
-    limits = pz.VoltageLimits(-50.0, 100.0, slew_rate=100.0, sample_rate=1000.0)
-    compensator = pz.LinearCompensator(pz.LinearGain(0.15), limits)
+SLEWED = pz.VoltageLimits(-50.0, 100.0, slew_rate=100.0, sample_rate=1000.0)
+
+
+@pytest.mark.parametrize(
+    "compensator",
+    [
+        pz.LinearCompensator(pz.LinearGain(0.15), SLEWED),
+        pz.InverseCompensator(CREEPING, sample_rate=1000.0),
+    ],
+)
+def test_what_is_for_another_rate_is_refused(compensator: Any) -> None:
     estimator, r = pz.HysteresisRLS(5000.0), pz.signals.triangle(1.0, 5.0, 1, 5000.0)
     for call in (
         lambda: pz.IntegralFeedback(compensator, gain=5.0, sample_rate=5000.0),
         lambda: pz.export.Controller(estimator, compensator),
         lambda: pz.export.c(estimator, compensator),
         lambda: pz.track(r, stage=pz.PaperStage(5000.0), compensator=compensator),
+        lambda: pz.track(
+            r,
+            stage=pz.PaperStage(5000.0),
+            compensator=pz.IntegralFeedback(compensator, gain=1.0, sample_rate=1e3),
+        ),
     ):
         with pytest.raises(ValueError, match=r"sample.rate"):
             call()

@@ -60,6 +60,16 @@ def test_a_lag_that_passes_for_hysteresis_is_told_once(block: int, noise: float)
     assert follows(wave(20.0, 12), block=block, noise=noise)[1] == []
 
 
+@pytest.mark.parametrize("backlash", [0.6, 0.9])
+def test_backlash_is_no_lag(backlash: float) -> None:
+    """The first way, of 2.4 V, is answered late, but ends at once."""
+    driver, rng = controller(), np.random.default_rng(0)
+    stage = pz.SimulatedStage(FS, pz.PrandtlIshlinskii(0.005, [backlash], [0.1]))
+    drive(driver, stage, wave(20.0, 12), lambda _, x: x + 2e-3 * rng.normal())
+    assert notes(driver, "lag") == []
+    assert driver.state["start"]["lag"] < 0.1e-3 * FS
+
+
 def test_an_amplifier_that_slews_is_no_lag() -> None:
     amplifier = pz.stage.Amplifier(-60.0, 60.0, slew_rate=120.0)
     driver = controller()

@@ -214,6 +214,17 @@ def test_a_gain_of_the_wrong_sign_is_doubted(limits: Any, width: float, hum: flo
     assert "out of reach" not in [event.name for event in driver.events]
 
 
+@pytest.mark.parametrize("widest", [60.0, 90.0])
+def test_an_edge_that_touches_a_limit_is_no_rest_there(widest: float) -> None:
+    plays = pz.PrandtlIshlinskii(0.1, np.linspace(1.0, widest, 20), np.full(20, 0.01))
+    stage, swept = pz.SimulatedStage(2000.0, plays), plays.simulate(np.linspace(0.0, 100.0, 300))
+    driver = pz.AdaptiveFeedforward(2000.0, limits=pz.VoltageLimits(0.0, 100.0))
+    square = np.tile(np.repeat([0.85, 0.15], 500), 12) * swept[-1]
+    shared.drive(driver, stage, square, lambda k, x: x + 1e-3 * np.sin(7.0 * k))
+    assert "false start" not in [event.name for event in driver.events]
+    assert driver.status.stage == "running"
+
+
 @pytest.mark.parametrize("phase", np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False))
 def test_the_start_does_not_wait_until_hum_rests(phase: float) -> None:
     driver, hum = pz.AdaptiveFeedforward(FAST, limits=pz.VoltageLimits(-20.0, 100.0)), 0.2

@@ -28,6 +28,16 @@ def test_settled_voltage_gives_the_reference(model: Any) -> None:
     np.testing.assert_allclose(x[-TRIANGLE.values.size :], made.reference, atol=1e-6)
 
 
+def test_creep_is_that_at_the_rate_of_the_reference() -> None:
+    creep = pz.Creep([0.3], [0.05])
+    model = pz.PrandtlIshlinskii(
+        0.1, [1.0, 5.0], [0.01, 0.02], creep=creep, sample_rate=2.0 * TRIANGLE.sample_rate
+    )
+    made = pz.export.table(model, TRIANGLE)
+    x = model.simulate(np.tile(made.voltage, 40), sample_rate=TRIANGLE.sample_rate)
+    np.testing.assert_allclose(x[-TRIANGLE.values.size :], made.reference, atol=1e-6)
+
+
 def test_branches_run_between_turning_points_and_files_can_be_read_back(tmp_path: Path) -> None:
     made = pz.export.table(LOOP, TRIANGLE, points=65)
     assert [b.shape for b in made.branches] == [(65, 2)] * 2

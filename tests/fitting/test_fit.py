@@ -34,7 +34,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "another run": ({"u": voltage(np.random.default_rng(1))}, "x must rise with u.* leaves .* of one run"),
     "constant displacement": ({"x": np.full(N, 2.0)}, "x must move with u, it stays at 2 µm"),
     "model": ({"model": "spline"}, "model must be one of line, .*, got 'spline'"),
-    "delay too long": ({"delay": 10.5}, "delay must"),
+    "delay too long": ({"delay": 30.5}, "delay must"),
     "delay no number": ({"delay": np.nan}, "delay must"),
     "delay in words": ({"delay": "soon"}, "delay must be 'auto' or a number of samples, got 'soon'"),
     "settle": ({"settle": 10.0}, "settle must"),

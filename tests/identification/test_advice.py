@@ -59,8 +59,9 @@ GROWS = signals.multi_amplitude([10.0, 30.0, 50.0, 20.0, 40.0, 50.0], 5.0, 4, FS
         # The offset of its model is above 1 µm.
         (log(sine(12_000), late(PLAYS.simulate(sine(12_000)), 30), 8e-3), "plays", "", "not centred"),
         (log(FOLLOWED.displacement, FOLLOWED.voltage), "plays", "clockwise", "straight line"),
-        (log(SWINGS, late(LOOP.simulate(SWINGS), 14)), "line", "10 samples or more", "oscillates"),
+        (log(SWINGS, late(LOOP.simulate(SWINGS), 14)), "line", "by about 13 samples", "oscillates"),
         (FOLLOWED, "line", "", "oscillates"),
+        (log(sine(2000, 1.0, 40.0), LOOP.simulate(sine(2000, 1.0, 40.0))), "line", "", "oscillates"),
         (ringing(), "plays", "oscillates at 80", "clockwise"),
         (ROUNDED, "plays", "", "no model here"),
         (log(sine(8000), CREEPS.simulate(sine(8000))), "plays-creep", "Creep is not known", "clockwise"),

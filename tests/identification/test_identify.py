@@ -216,7 +216,7 @@ def test_what_tells_little_of_a_loop_is_fitted_by_another_kind(name: str) -> Non
 
 @pytest.mark.parametrize(
     "arguments",
-    [{"train": 0.0}, {"train": 1.0}, {"delay": 11.0}, {"delay": "later"}, {"settle": -1.0},
+    [{"train": 0.0}, {"train": 1.0}, {"delay": 31.0}, {"delay": "later"}, {"settle": -1.0},
      {"model": "spline"}, {"sample_rate": 100.0}],
 )  # fmt: skip
 def test_arguments_out_of_range(arguments: dict[str, Any]) -> None:

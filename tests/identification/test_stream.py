@@ -134,7 +134,7 @@ def test_streams_that_show_nothing_are_refused(tmp_path: Path) -> None:
             pz.identify_stream(saved(tmp_path, *log))
     with pytest.raises(ValueError, match="log must be a RecordStream, got str"):
         pz.identify_stream("log.npy")  # type: ignore[arg-type]
-    for options in ({"train": 1.0}, {"delay": 11.0}, {"delay": np.nan}):
+    for options in ({"train": 1.0}, {"delay": 31.0}, {"delay": np.nan}):
         with pytest.raises(ValueError, match=next(iter(options))):
             pz.identify_stream(saved(tmp_path, u, x), **options)  # type: ignore[arg-type]
 

@@ -11,6 +11,7 @@ from scipy.signal import cont2discrete
 
 from piezoest import Creep, MassSpringDamper, PrandtlIshlinskii
 from piezoest.equations.mechanics import mechanics_coefficients
+from piezoest.signals import triangle
 
 MODEL = PrandtlIshlinskii(0.1, [1.0, 4.0], [0.02, 0.03])
 CREEP, MECHANICS = Creep.logarithmic(0.01, shortest=0.01, longest=10.0), MassSpringDamper(780.0, 0.02)
@@ -67,6 +68,13 @@ def test_creep() -> None:
     # Of first-order terms: gains (1 - exp(-t/time constants)) after a step.
     t = np.arange(1.0, 1.0 + x.size)[:, None] / 1000.0
     np.testing.assert_allclose(x, (1.0 - np.exp(-t / CREEP.time_constants)) @ CREEP.gains, atol=1e-12)
+    # A signal says its rate.
+    model = PrandtlIshlinskii(0.1, [1.0], [0.02], creep=CREEP, sample_rate=1000.0)
+    coarse, fine = (triangle(30.0, 5.0, 2, rate) for rate in (1000.0, 4000.0))
+    np.testing.assert_allclose(model.simulate(fine.values[::4]), model.simulate(fine)[::4], atol=1e-3)
+    np.testing.assert_allclose(model.simulate(model.invert(fine), sample_rate=4000.0), fine, atol=1e-9)
+    with pytest.raises(ValueError, match="sample rates differ: u has 1000 Hz, 4000 Hz is expected"):
+        model.simulate(coarse, sample_rate=4000.0)
     rest = CREEP.simulate(np.zeros(1), sample_rate=1000.0, initial_state=CREEP.gains)
     assert rest[0] == pytest.approx(np.sum(CREEP.gains * CREEP.decays(1000.0)))
 
