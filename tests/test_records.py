@@ -1,5 +1,6 @@
 """Recorded logs: what is recognised, what is refused, and in which words."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -135,6 +136,10 @@ def test_files_without_a_log(tmp_path: Path) -> None:
             read_record(file)
     with pytest.raises(FileNotFoundError):
         read_record(tmp_path / "none.csv")
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe.csv")
+        with pytest.raises(ValueError, match=r"pipe\.csv: a log is read more than once"):
+            read_record(tmp_path / "pipe.csv")
 
 
 def test_round_trip(tmp_path: Path) -> None:

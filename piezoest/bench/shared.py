@@ -49,7 +49,7 @@ def usage(folder: Path | None = None) -> Iterator[None]:
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     except KeyboardInterrupt:
-        if folder is not None:
+        if folder is not None and folder.exists():
             print(f"stopped: the same command continues from {folder}", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None
 

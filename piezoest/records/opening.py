@@ -30,6 +30,8 @@ OF_SPREADSHEETS = {"xl/workbook.xml", "xl/workbook.bin", "content.xml"}
 
 def open_source(path: Path) -> Source:
     """Open a log by what it begins with, or else by the ending of its name."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise LogError(f"{path}: a log is read more than once, a pipe is not: save it as a file first")
     start, ending = _signature(path), path.suffix.lower()
     if not start.strip():
         raise LogError(f"{path}: the file is empty")
