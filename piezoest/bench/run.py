@@ -101,9 +101,9 @@ def follow(case: Case, estimator: str) -> TrackingRecord:
         made = candidate(estimator)(rate, case.start)
         if hasattr(made, "learn"):
             return track(case.reference, stage=case.new_stage(), controller=made)
-        if not hasattr(made, "model"):
-            raise ValueError(f"{estimator} has no model: see piezoest.Estimator")
-        start = case.linear_start if isinstance(made.model, LinearGain) else case.start
+        # What has no model is refused by `track`.
+        linear = isinstance(getattr(made, "model", None), LinearGain)
+        start = case.linear_start if linear else case.start
         compensator = InverseCompensator(start, LIMITS, transfer_samples=transfer)
     return track(
         case.reference,

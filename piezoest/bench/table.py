@@ -55,7 +55,7 @@ class Plan:
         rate = Conditions(**self.given).sample_rate
         for estimator in self.estimators:
             make = candidate(estimator)
-            if ":" not in estimator:  # whose own fails, is shown its traceback after the runs
+            if ":" not in estimator:  # one of the user's own is reported with its traceback, after the runs
                 make(rate, RIGHT_MODEL)
 
     def tasks(self) -> list[Task]:

@@ -140,14 +140,15 @@ def best_delay(log: Log, start: Start) -> float:
         moved = replace(log, u=late(log.u, delay))
         return moved, plays(moved, start, bends=BENDS)
 
-    def best_of(first: float, last: float) -> float:
-        return float(min(np.arange(first, last + 1.0), key=lambda each: missed(*delayed(each))))
+    def least(first: float, last: float) -> tuple[float, float]:
+        """What is missed with the best delay, and that delay."""
+        return min((missed(*delayed(float(each))), float(each)) for each in np.arange(first, last + 1.0))
 
-    whole = delay = best_of(0.0, USUAL_DELAY)
+    left, whole = least(0.0, USUAL_DELAY)
     if whole == USUAL_DELAY:
-        longer = best_of(USUAL_DELAY, LONGEST_DELAY)
-        if missed(*delayed(longer)) < LONGER * missed(*delayed(whole)):
-            whole = delay = longer
+        further, longer = least(USUAL_DELAY + 1.0, LONGEST_DELAY)
+        whole = longer if further < LONGER * left else whole
+    delay = whole
     for _ in range(REFINED):
         moved, basis = delayed(delay)
         step = delay_step(moved, log.u, regression(moved, basis).best(SMOOTH), delay)

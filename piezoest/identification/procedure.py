@@ -24,6 +24,7 @@ from piezoest.identification.sense import findings
 from piezoest.identification.steps_of_converter import levels
 from piezoest.models import LearntOn
 from piezoest.records import Record, as_record
+from piezoest.records.as_record import one_log
 
 # A parameter that is not known to this fraction of itself was not excited by the record.
 LARGEST_RELATIVE_ERROR = 0.5
@@ -108,7 +109,7 @@ def identify(
     train = fraction("train", train, 0.1, 0.9)
     record = as_record(data, displacement, sample_rate=sample_rate, columns=columns, units=units)
     logs = instance("validate", validate, (list, tuple), "a list of logs: validate=[log]")
-    others = [as_record(each, called=f"validate[{i}]") for i, each in enumerate(logs)]
+    others = [one_log(f"validate[{i}]", each) for i, each in enumerate(logs)]
     validated = [(each, flawed(each.voltage, each.displacement)) for each in others]
     for each, its in validated:
         check_enough("part to validate", each.source, int(np.count_nonzero(judged(each, its))))

@@ -18,7 +18,6 @@ def as_record(
     sample_rate: float | None = None,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
-    called: str = "data",
 ) -> Record:
     """Make a record of a file, a table or arrays.
 
@@ -33,8 +32,6 @@ def as_record(
         [Hz]; must be given with arrays.
     columns, units : mapping of str to str, optional
         With a file or a table only, as for `read_record`.
-    called : str
-        Name of the argument for messages; one that is called otherwise stands alone, and is no array.
 
     Returns
     -------
@@ -67,13 +64,19 @@ def as_record(
     if displacement is None:
         shape = getattr(data, "shape", None)
         got = type(data).__name__ if shape is None else f"one array of shape {tuple(shape)}"
-        if called != "data":
-            raise ValueError(f"{called} must be a log, got {got}: {TAKEN}; make one by Record.from_arrays")
         raise ValueError(f"data must be a log, got {got} and no displacement: {TAKEN}, {ARRAYS}")
     _refuse(given, ("columns", "units"), "arrays are voltage in V and displacement in µm")
     if sample_rate is None:
         raise ValueError("sample_rate must be given with two arrays, in Hz: sample_rate=10000.0")
     return Record.from_arrays(data, displacement, sample_rate)
+
+
+def one_log(name: str, log: Any) -> Record:
+    """Make a record of an argument that is a whole log: no arrays."""
+    if not (isinstance(log, Record | str | Path) or is_frame(log) or hasattr(log, "collect")):
+        got = type(log).__name__
+        raise ValueError(f"{name} must be a log, got {got}: {TAKEN}; make one by Record.from_arrays")
+    return as_record(log)
 
 
 def _refuse(given: Mapping[str, Any], names: tuple[str, ...], why: str) -> None:
